@@ -97,7 +97,8 @@ def inside_any(drive: DriveResult, found: list[Braking]) -> NDArray[np.bool_]:
     return rows
 
 
-def _mean(values: Vector) -> float:
+def mean_known(values: Vector) -> float:
+    """Return the mean of the finite values, NaN where there is none."""
     finite = values[np.isfinite(values)]
     return float(finite.mean()) if finite.size else float("nan")
 
@@ -143,7 +144,7 @@ def _from_file(drive: DriveResult, path: Path) -> list[Braking]:
             per_corner[1][order], per_corner[2][order],
             str(reasons[order[0]] or "") if reasons else left_out(duration, achieved, predicted),
         )  # fmt: skip
-        found.append(braking._replace(demanded=_mean(_demand(drive)[inside(drive, braking)])))
+        found.append(braking._replace(demanded=mean_known(_demand(drive)[inside(drive, braking)])))
     return found
 
 
@@ -164,7 +165,7 @@ def _from_result(drive: DriveResult) -> list[Braking]:
                 t_end=float(drive.t[last]),
                 v_in=float(speed[first]),
                 v_end=float(speed[last]),
-                demanded=_mean(_demand(drive)[first:end]),
+                demanded=mean_known(_demand(drive)[first:end]),
                 achieved=float(speed[first] - speed[last]) / duration,
                 predicted=float("nan"),
                 friction=friction[min(end, len(friction) - 1)],

@@ -10,7 +10,7 @@ import numpy as np
 
 from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
-from brakelab.report.brakings import Braking, inside
+from brakelab.report.brakings import Braking, inside, mean_known
 from brakelab.report.drive import DriveResult
 from brakelab.report.look import DEMAND, LEFT, QUIET, RIGHT, STAGE_COLOURS
 from brakelab.report.per_braking import Series, points_by_braking
@@ -106,7 +106,7 @@ def responses(drive: DriveResult, found: list[Braking]) -> list[Response]:
                 _pair(*(each.plateau for each in built)),
                 _pair(*(_sides(callipers[within][:, wheels], LEAST_BAR) for wheels in AXLES.values())),
                 _pair(*(_sides(friction[within][:, wheels], 0.0) for wheels in AXLES.values())),
-                _mean(share[within]),
+                mean_known(share[within]),
             )
         )
     return rows
@@ -114,11 +114,6 @@ def responses(drive: DriveResult, found: list[Braking]) -> list[Response]:
 
 def _pair(front: float, rear: float) -> tuple[float, float]:
     return front, rear
-
-
-def _mean(values: Vector) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else float("nan")
 
 
 def _sides(values: Vector, least: float) -> float:

@@ -1,5 +1,6 @@
 """Tables of text: for the terminal (rich) and for the documentation (Markdown)."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -16,6 +17,11 @@ class Table(NamedTuple):
     columns: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
     below: str
+
+
+def cell(value: float, digits: str) -> str:
+    """Return a number as the format `digits` says, – where it is not known."""
+    return f"{value:{digits}}" if math.isfinite(value) else "–"
 
 
 def show(console: Console, table: Table) -> None:

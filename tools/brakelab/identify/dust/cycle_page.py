@@ -9,7 +9,7 @@ from brakelab.identify.dust.cycle_run import NEAR_S, NEAR_SPEED, Run, read_run
 from brakelab.identify.measurement_files import read_manifest
 from brakelab.results import euro7
 from brakelab.results.outputs import check_outputs, config_files, write_text
-from brakelab.results.text_table import Table, markdown
+from brakelab.results.text_table import Table, cell, markdown
 from brakelab.simulation.trip.wltp_brake import DISC_AT_START, TOTALS, TRIPS
 from ecu.errors import UserError
 from ecu.output import give, wrote
@@ -26,10 +26,6 @@ NOT_OBTAINED: Final = (
 )
 
 
-def _shown(value: float, digits: str) -> str:
-    return f"{value:{digits}}" if np.isfinite(value) else "–"
-
-
 def trip_table(run: Run) -> Table:
     """Return the trips as run."""
     rows = []
@@ -43,13 +39,13 @@ def trip_table(run: Run) -> Table:
                 f"{trip.seconds:.0f}",
                 f"{trip.applications}",
                 f"{trip.work:.2f}",
-                f"{trip.cold:.0f} ({_shown(trip.cold - begin, '+.0f')})",
+                f"{trip.cold:.0f} ({cell(trip.cold - begin, '+.0f')})",
                 f"{trip.hottest:.0f}",
                 f"{trip.violations}" if trip.violations >= 0 else "–",
-                _shown(trip.outside, ".1f"),
-                _shown(1e-9 * trip.total / trip.km, ".3f"),
-                _shown(1e-9 * net / trip.km, ".3f"),
-                _shown(1e-9 * trip.solid / trip.km, ".3f"),
+                cell(trip.outside, ".1f"),
+                cell(1e-9 * trip.total / trip.km, ".3f"),
+                cell(1e-9 * net / trip.km, ".3f"),
+                cell(1e-9 * trip.solid / trip.km, ".3f"),
             )
         )
     return Table(
@@ -76,16 +72,16 @@ def whole_table(run: Run) -> Table:
         ("distance [km]", f"{km:.2f}", f"{1e-3 * TOTALS.metres:.0f}", CYCLE),
         ("time [s]", f"{seconds:.0f}", f"{TOTALS.seconds:.0f}", CYCLE),
         ("brake applications", f"{applications}", f"{TOTALS.brakings}", CYCLE),
-        ("outside of the speed's tolerance [s]", _shown(run.sum_of("outside"), ".1f"), "–", TOLERANCE),
+        ("outside of the speed's tolerance [s]", cell(run.sum_of("outside"), ".1f"), "–", TOLERANCE),
         ("friction share c", f"{run.share:.3g}", "–", stated),
-        ("PM10 [mg/km], this brake", _shown(run.mass("pm10"), ".3f"), limit, source),
-        ("PM2.5 [mg/km], this brake", _shown(run.mass("pm25"), ".3f"), "none there", source),
-        ("TPN10 [10⁹/km], this brake", _shown(1e-9 * run.number("total"), ".3f"), "none there", source),
-        ("of it background [10⁹/km]", _shown(1e-9 * run.number("background"), ".3f"), "–", "cruising"),
-        ("SPN10 [10⁹/km], this brake", _shown(1e-9 * run.number("solid"), ".3f"), "none there", source),
-        ("pads lost [mg/km], linings alone", _shown(run.lost("pads"), ".2f"), "–", "balance"),
-        ("disc lost [mg/km], linings alone", _shown(run.lost("disc"), ".2f"), "–", "balance"),
-        ("PM10 of what pads and disc lost [%]", _shown(_airborne(run), ".0f"), "–", "both"),
+        ("PM10 [mg/km], this brake", cell(run.mass("pm10"), ".3f"), limit, source),
+        ("PM2.5 [mg/km], this brake", cell(run.mass("pm25"), ".3f"), "none there", source),
+        ("TPN10 [10⁹/km], this brake", cell(1e-9 * run.number("total"), ".3f"), "none there", source),
+        ("of it background [10⁹/km]", cell(1e-9 * run.number("background"), ".3f"), "–", "cruising"),
+        ("SPN10 [10⁹/km], this brake", cell(1e-9 * run.number("solid"), ".3f"), "none there", source),
+        ("pads lost [mg/km], linings alone", cell(run.lost("pads"), ".2f"), "–", "balance"),
+        ("disc lost [mg/km], linings alone", cell(run.lost("disc"), ".2f"), "–", "balance"),
+        ("PM10 of what pads and disc lost [%]", cell(_airborne(run), ".0f"), "–", "both"),
     ]
     return Table(
         "Run",
@@ -139,8 +135,8 @@ def report_cycle(manifest: Path, config: Path, axle: str, out: Path) -> int:
     parts = "\n".join(map(markdown, tables)).rstrip()
     write_text(out, f"# Run of the WLTP-Brake cycle, {axle} brake\n\n{said}\n\n{parts}\n")
     print(
-        f"{out}: {run.sum_of('km'):.1f} km, PM10 {_shown(run.mass('pm10'), '.2f')} mg/km, TPN10 "
-        f"{_shown(1e-9 * run.number('total'), '.2f')}e9/km of this brake, c {run.share:.3g}"
+        f"{out}: {run.sum_of('km'):.1f} km, PM10 {cell(run.mass('pm10'), '.2f')} mg/km, TPN10 "
+        f"{cell(1e-9 * run.number('total'), '.2f')}e9/km of this brake, c {run.share:.3g}"
     )
     for line in found:
         print(f"{out}: {line}")

@@ -12,7 +12,7 @@ from brakelab.identify.wear.fusion import Fused
 from brakelab.identify.wear.reader import Block
 from brakelab.identify.wear.reproduced import reproduced_table
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line, Panel, write_chart
-from brakelab.results.text_table import Table, markdown
+from brakelab.results.text_table import Table, cell, markdown
 
 MOTION: Final = ((5.0, BLUE), (20.0, GREEN), (50.0, ORANGE))  # kW of friction
 DECEL: Final = 2.0  # m/s^2 of the surface
@@ -177,20 +177,16 @@ def tables(blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> list[Tab
 
 def _apart(blocks: list[Block]) -> list[Table]:
     """Return pads and disc of every block one by one, where they were measured."""
-
-    def shown(value: float, digits: str) -> str:
-        return f"{value:{digits}}" if np.isfinite(value) else "–"
-
     rows = [
         (
             block.name,
-            *(shown(mass, ".2f") for mass in block.lost.sides),
-            shown(block.lost.sides[0] / block.lost.sides[1], ".2f"),
-            *(shown(1e3 * value, ".0f") for value in block.lost.thin),
-            *(shown(1e3 * value, "+.0f") for value in (block.lost.along, block.lost.across)),
-            shown(block.lost.disc_mass, ".2f"),
-            shown(1e3 * block.lost.disc_wear, ".0f"),
-            shown(block.lost.disc_mass / float(block.regressors[0]), ".4f"),
+            *(cell(mass, ".2f") for mass in block.lost.sides),
+            cell(block.lost.sides[0] / block.lost.sides[1], ".2f"),
+            *(cell(1e3 * value, ".0f") for value in block.lost.thin),
+            *(cell(1e3 * value, "+.0f") for value in (block.lost.along, block.lost.across)),
+            cell(block.lost.disc_mass, ".2f"),
+            cell(1e3 * block.lost.disc_wear, ".0f"),
+            cell(block.lost.disc_mass / float(block.regressors[0]), ".4f"),
         )
         for block in blocks
     ]

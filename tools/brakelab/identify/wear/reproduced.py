@@ -15,7 +15,7 @@ from brakelab.arrays import Array
 from brakelab.identify.friction.sequence import Sequence
 from brakelab.identify.wear.applications import KMH
 from brakelab.identify.wear.programme import Stop, stops_of
-from brakelab.results.text_table import Table
+from brakelab.results.text_table import Table, cell
 from brakelab.results.verdict import Goal, verdict
 
 LARGEST_ERROR: Final = 6.0
@@ -125,19 +125,15 @@ def _pairs(
 
 def reproduced_table(blocks: list[Reproduced]) -> Table:
     """Return the blocks beside their programmes."""
-
-    def shown(value: float, digits: str) -> str:
-        return f"{value:{digits}}" if np.isfinite(value) else "–"
-
     rows = [
         (
             one.block,
             f"{one.done} of {one.asked}",
             f"{one.others}",
-            shown(one.speed, ".1f"),
-            shown(one.energy, "+.1f"),
-            shown(one.road, "+.1f"),
-            shown(one.heat, "+.0f"),
+            cell(one.speed, ".1f"),
+            cell(one.energy, "+.1f"),
+            cell(one.road, "+.1f"),
+            cell(one.heat, "+.0f"),
             one.verdict,
         )
         for one in blocks

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from brakelab.results.text_table import Table
+from brakelab.results.text_table import Table, cell
 from brakelab.studies.accuracy.observers import JOINT, NEVER, Row
 from brakelab.studies.accuracy.observers_cases import (
     ACCURACY,
@@ -249,7 +249,7 @@ def _events(rows: Rows) -> Table:
                 f"{row.case}, {row.observer}, {'adapted' if row.adapted else 'cold'}",
                 _seconds(row.seconds),
                 f"{longest:.2f}" if longest is not None else "–",
-                f"{row.force.median:.1f}" if math.isfinite(row.force.median) else "–",
+                cell(row.force.median, ".1f"),
                 _with_worst(row.nrmse),
                 _event_verdict(row, rows),
             )

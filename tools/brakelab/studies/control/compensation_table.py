@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from brakelab.arrays import Matrix, Vector
-from brakelab.results.text_table import Table
+from brakelab.results.text_table import Table, cell
 from brakelab.results.verdict import Goal, met, verdict
 from brakelab.studies.control.compensation import (
     CURVES,
@@ -121,7 +121,7 @@ def mass_table(cars: list[Car]) -> Table:
         means = [_known_mean(car.levels[name, "compensated"][0])[::2] for name in CURVES[:2]]
         chosen = np.concatenate([mean[[0, 2, 5]] for mean in means])
         rest.append(chosen - car.excess)
-        cells = (f"{value:+.1f}" if np.isfinite(value) else "–" for value in chosen)
+        cells = (cell(value, "+.1f") for value in chosen)
         rows.append((f"car {seed}", f"{car.excess:+.1f}", *cells))
     left = _known_mean(np.array(rest))
     scatter = np.sqrt(_known_mean((np.array(rest) - left) ** 2))
