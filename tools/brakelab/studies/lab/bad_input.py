@@ -128,8 +128,13 @@ def answers() -> list[Answer]:
     return found
 
 
+def answer_table(found: list[Answer], files: str) -> Table:
+    """Return the answers to wrong input; `files`: what was spoilt."""
+    rows = [(each.what, each.line, "refused" if each.is_refused else "read") for each in found]
+    below = f"{files} Lines as they are printed, folders left out."
+    return Table("Bad input", ("what", "line", ""), rows, below)
+
+
 def bad_input_table() -> Table:
     """Return the answers to wrong recordings."""
-    rows = [(each.what, each.line, "refused" if each.is_refused else "read") for each in answers()]
-    below = "AMS of brake A as a file of our own, spoilt. Lines as they are printed, folders left out."
-    return Table("Bad input", ("what", "line", ""), rows, below)
+    return answer_table(answers(), "AMS of brake A as a file of our own, spoilt.")

@@ -14,7 +14,7 @@ from brakelab.identify.wear.command import identify_wear
 from brakelab.results.text_table import Table
 from brakelab.simulation.campaigns.dust_trips import campaign, write_campaign
 from brakelab.simulation.campaigns.wear_blocks import drawn_car, programme, write_programme
-from brakelab.studies.lab.bad_input import Answer
+from brakelab.studies.lab.bad_input import Answer, answer_table
 from ecu.errors import UserError
 from ecu.settings.resources import resource
 
@@ -128,6 +128,4 @@ def answers() -> list[Answer]:
 
 def bad_input_table() -> Table:
     """Return the answers to wrong blocks and trips."""
-    rows = [(each.what, each.line, "refused" if each.is_refused else "read") for each in answers()]
-    below = "Four blocks, eight trips, one of them spoilt. Lines as they are printed, folders left out."
-    return Table("Bad input", ("what", "line", ""), rows, below)
+    return answer_table(answers(), "Four blocks, eight trips, one of them spoilt.")
