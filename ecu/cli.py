@@ -191,7 +191,7 @@ def run(
 def wear(
     config: Config,
     state: Annotated[Path, option("DIR", "Folder of learned values, as for `run` and `replay`")],
-    new_pads: Annotated[str | None, option("AXLE", "Register new pads: front, rear or all")] = None,
+    new_pads: Annotated[str | None, option("WHERE", "Register new pads: front, rear, all, a corner")] = None,
     measured: Annotated[
         str | None, option("fl=9.8,…", "Register measured linings in mm, without backplate")
     ] = None,

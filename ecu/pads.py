@@ -23,7 +23,10 @@ GAUGE: Final = 0.1  # mm, standard deviation of a thickness measured on the car
 TWO_SIDED: Final = 1.96  # standard deviations of a band of 95 %
 LEAST_DISTANCE: Final = 50e3  # m with these pads, before a remaining distance is given
 FEW_LEGS: Final = 0.3  # relative, of the wear per distance with fewer than three legs
-AXLES: Final = {"front": (0, 1), "rear": (2, 3)}
+PLACES: Final = {"front": (0, 1), "rear": (2, 3), "all": (0, 1, 2, 3)} | {
+    corner: (i,) for i, corner in enumerate(CORNERS)
+}
+"""Corners of what is fitted with new pads."""
 
 
 class Corner(NamedTuple):
@@ -51,9 +54,9 @@ def pads(config: Config) -> tuple[Pad, Pad, Pad, Pad]:
     return config.front.pad, config.front.pad, config.rear.pad, config.rear.pad
 
 
-def fit_new(wear: Any, axle: str) -> None:
-    """Register new pads on an axle; `wear` is one `WEAR`."""
-    for i in AXLES[axle]:
+def fit_new(wear: Any, place: str) -> None:
+    """Register new pads in one of `PLACES`; `wear` is one `WEAR`."""
+    for i in PLACES[place]:
         for name in ("regressors", "friction_error", "temperature_error", "measured_at", "leg_ends"):
             wear[name][..., i] = 0.0
         for name in ("measured_wear", "measured_sigma"):
@@ -73,8 +76,8 @@ def add_measurement(wear: Any, i: int, lost: float, sigma: float) -> None:
     wear["measurements"][i] = n + 1
 
 
-def measure(wear: Any, pad: Pad, i: int, thickness: float) -> None:
-    """Store a thickness [mm] measured at corner i.
+def worn_off(wear: Any, pad: Pad, i: int, thickness: float) -> float:
+    """Return the wear [mm] by a thickness [mm] measured at corner i.
 
     Raises:
         UserError: the pad would be thicker than new, than at the last measurement, or next to none.
@@ -90,7 +93,12 @@ def measure(wear: Any, pad: Pad, i: int, thickness: float) -> None:
         )
     if not thickness > GAUGE:  # as metres would be
         raise UserError("--measured", name, "give the thickness of the lining in mm, without the backplate")
-    add_measurement(wear, i, pad.thickness_new - thickness, GAUGE)
+    return pad.thickness_new - thickness
+
+
+def measure(wear: Any, pad: Pad, i: int, thickness: float) -> None:
+    """Store a thickness [mm] measured at corner i. Raises UserError, as `worn_off`."""
+    add_measurement(wear, i, worn_off(wear, pad, i, thickness), GAUGE)
 
 
 def rate_per_metre(params: Any, wear: Any, i: int) -> tuple[float, float]:
@@ -195,18 +203,17 @@ def wear_command(config: Path, state: Path, new_pads: str | None, measured: str 
     """
     vehicle = load_config(config)
     params = new_params(vehicle)
-    if new_pads is not None and new_pads not in (*AXLES, "all"):
-        raise UserError("--new-pads", new_pads, "choose front, rear or all")
+    if new_pads is not None and new_pads not in PLACES:
+        raise UserError("--new-pads", new_pads, f"choose {', '.join(PLACES)}")
     if not state.is_dir():
         raise UserError("--state", str(state), "no such folder; give the one that `run` or `replay` keeps")
     thicknesses = parse_measured(measured) if measured else {}
-    axles = tuple(AXLES) if new_pads == "all" else (new_pads,) if new_pads else ()
-    changes = bool(axles or thicknesses)
+    changes = bool(new_pads or thicknesses)
     with alone(state) if changes else nullcontext():
         found = restored(state, vehicle, params)
         learned = found[1] if found else new_state(params)["learned"].copy()
-        for axle in axles:
-            fit_new(learned[0]["wear"], axle)
+        if new_pads is not None:
+            fit_new(learned[0]["wear"], new_pads)
         for i, thickness in thicknesses.items():
             measure(learned[0]["wear"], pads(vehicle)[i], i, thickness)
         if changes:

@@ -3,7 +3,8 @@
 Another process writes a page of the ring and asks for it; the loop takes it over between two cycles, or
 refuses it (`ecu/runtime/calibration.py`), and says in the ring's header which page it goes by, and since
 which cycle. That page stays as it is until the next one is taken over. A recording has a line of JSON for
-each, by which `replay` exchanges the parameters before the same cycle.
+each, by which `replay` exchanges the parameters before the same cycle. With a page goes what a workshop does
+to the learned values, once, as the page is taken over.
 """
 
 import json
@@ -15,6 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from ecu.contract.records import RecordArray
+from ecu.contract.work import Work, from_json, from_record, to_json, to_record
 from ecu.recording.ring import PAGE, TABLES_BYTES, Ring
 
 NOTES_FILE: Final = "calibrations.jsonl"
@@ -31,6 +33,8 @@ class Note(NamedTuple):
     """The first that goes by it."""
     tables: dict[str, Any]
     """The tables of CONFIG that it replaces, whole."""
+    work: Work | None = None
+    """What is done before that cycle, once."""
 
 
 def check_of(ring: Ring, page: int) -> int:
@@ -38,7 +42,9 @@ def check_of(ring: Ring, page: int) -> int:
     return zlib.crc32(ring.pages[page : page + 1].view(np.uint8).data)
 
 
-def ask(ring: Ring, params: RecordArray, tables: dict[str, Any], until_ns: int) -> int:
+def ask(
+    ring: Ring, params: RecordArray, tables: dict[str, Any], until_ns: int, work: Work | None = None
+) -> int:
     """Ask the loop of a `ring` that may be written for parameters; return the number that it will answer.
 
     Args:
@@ -46,6 +52,7 @@ def ask(ring: Ring, params: RecordArray, tables: dict[str, Any], until_ns: int) 
         params: `PARAMS`, shape (1,).
         tables: of CONFIG, those that they may differ in.
         until_ns: refused later than that, on the monotonic clock.
+        work: to be done as they are taken over.
     """
     text = json.dumps(tables).encode()
     if len(text) > TABLES_BYTES:
@@ -55,6 +62,7 @@ def ask(ring: Ring, params: RecordArray, tables: dict[str, Any], until_ns: int) 
     page = 1 - int(header["page"])
     content = np.zeros(1, PAGE)
     content["number"], content["params"], content["tables"] = header["calibration"] + 1, params, text
+    content["work"] = to_record(work)
     ring.pages[page] = content[0]
     asked["page"], asked["until_ns"], asked["check"] = page, until_ns, check_of(ring, page)
     asked["number"] = number
@@ -67,14 +75,15 @@ def in_force(ring: Ring) -> Note | None:
     while number := int(header["calibration"][0]):
         page, cycle = ring.pages[int(header["page"][0])].copy(), int(header["calibrated_from"][0])
         if page["number"] == number:  # else another one is being taken over
-            return Note(number, cycle, json.loads(bytes(page["tables"])))
+            return Note(number, cycle, json.loads(bytes(page["tables"])), from_record(page["work"]))
     return None
 
 
 def add_note(folder: Path, note: Note) -> None:
     """Add a line to the notes of a recording. Raises OSError."""
+    line = {**note._asdict(), "work": note.work and to_json(note.work)}
     with (folder / NOTES_FILE).open("a", encoding="utf-8") as file:
-        file.write(json.dumps(note._asdict()) + "\n")
+        file.write(json.dumps(line) + "\n")
         file.flush()
         os.fsync(file.fileno())
 
@@ -90,4 +99,7 @@ def read_notes(folder: Path) -> list[Note]:
         return []
     lines = path.read_text(encoding="utf-8").splitlines()
     found = [json.loads(line) for line in lines]
-    return [Note(int(one["number"]), int(one["cycle"]), dict(one["tables"])) for one in found]
+    return [
+        Note(int(one["number"]), int(one["cycle"]), dict(one["tables"]), from_json(one.get("work")))
+        for one in found
+    ]

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from ecu.algorithm.estimate import ESTIMATE
 from ecu.contract.params import PARAMS
 from ecu.contract.records import CYCLE, FRAME, INPUT_WATCH, INPUTS, LEARNED, OUTPUTS, RecordArray
+from ecu.contract.work import WORK
 from ecu.errors import UserError
 from ecu.recording.lock import lock
 
@@ -51,8 +52,10 @@ ASKED: Final = np.dtype(
         ("check", "i8"),  # CRC-32 of the page
     ]
 )
-# Parameters, and the tables of CONFIG that they are made of (JSON).
-PAGE: Final = np.dtype([("number", "i8"), ("params", PARAMS), ("tables", f"S{TABLES_BYTES}")], align=True)
+# Parameters, the tables of CONFIG that they are made of (JSON), and what is done once as they are taken over.
+PAGE: Final = np.dtype(
+    [("number", "i8"), ("params", PARAMS), ("tables", f"S{TABLES_BYTES}"), ("work", WORK)], align=True
+)
 _CALIBRATION: Final = np.dtype([("asked", ASKED), ("pages", PAGE, (2,))], align=True)
 _HEADER: Final = np.dtype(
     [
@@ -73,7 +76,7 @@ _HEADER: Final = np.dtype(
         ("last_words", f"S{_LAST_WORDS_BYTES}"),  # JSON
     ]
 )
-_MAGIC: Final = int.from_bytes(b"ecuring6", "little")
+_MAGIC: Final = int.from_bytes(b"ecuring7", "little")
 _PAGE: Final = 4096
 _NO_OBJECT: Final = (ValueError, TypeError, RecursionError)  # of JSON
 

@@ -24,6 +24,7 @@ import numpy as np
 import structlog
 
 from ecu.contract.records import RecordArray
+from ecu.contract.work import to_json
 from ecu.errors import UserError
 from ecu.recording import store as state_store
 from ecu.recording.calibration import add_note, in_force, read_notes
@@ -67,7 +68,7 @@ class Recorder:
         self.channel, self.key = str(about["channel"]), str(about["store_key"])
         self.files: RecordingFiles | None = None
         self._limit_bytes, self._looked_s = limit_bytes, -math.inf
-        self._noted = 0
+        self._noted, self._worked = 0, -1
         if again:
             self._go_on(record)
         elif record:
@@ -141,14 +142,18 @@ class Recorder:
             self._stop_recording(str(files.folder), str(error.strerror))
 
     def _note_calibration(self) -> None:
-        """Log a calibration and note it in the recording, before its cycles are reported as handled."""
+        """Log a calibration or work and note it in the recording, before its cycles count as handled."""
         if int(self.reader.ring.header["calibration"][0]) == self._noted:
             return
         found = in_force(self.reader.ring)
         if found is None:
             return
         self._noted = found.number
-        self.log.info("calibrated", number=found.number, cycle=found.cycle)
+        if found.work is None:
+            self.log.info("calibrated", number=found.number, cycle=found.cycle)
+        else:
+            self._worked = found.cycle
+            self.log.info("serviced", number=found.number, cycle=found.cycle, **to_json(found.work))
         if self.files:
             try:
                 add_note(self.files.folder, found)
@@ -162,9 +167,13 @@ class Recorder:
         self.files = None
 
     def _keep(self) -> None:
-        """Save after a brake application, or a minute after another change."""
+        """Save after work on the learned values or a brake application, or a minute after another change."""
         now_s, learned = time.monotonic(), self.reader.latest("learned")
-        if learned is not None and (self._is_removed() or state_store.is_due(self.keeper, learned, now_s)):
+        if learned is None:
+            return
+        worked = 0 <= self._worked <= self.reader.last_read
+        if worked or self._is_removed() or state_store.is_due(self.keeper, learned, now_s):
+            self._worked = -1 if worked else self._worked
             self._save(learned, now_s)
 
     def _is_removed(self) -> bool:

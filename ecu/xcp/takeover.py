@@ -5,7 +5,6 @@ Everything is made here, in the process of the slave: the loop (`ecu/runtime/cal
 
 import secrets
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,18 +13,15 @@ import structlog
 
 from ecu.contract.records import RecordArray, new_record
 from ecu.errors import UserError
-from ecu.recording.calibration import ask, in_force
+from ecu.recording.calibration import in_force
 from ecu.recording.ring import RingReader
-from ecu.runtime.clock import monotonic_s
+from ecu.runtime.asking import Busy, Sleep, taken_over
 from ecu.runtime.xcp import SAVE_OPTION, SAVED
 from ecu.settings.config import config_of, new_params
 from ecu.settings.toml_file import toml_lines
 from ecu.xcp.parameters import PARAMETERS, tables_of, to_record
 from ecu.xcp.protocol import Error, Refused
 
-ANSWERS_IN_S: Final = 0.5
-"""The loop looks ten times a second."""
-LOOK_S: Final = 0.01
 WHERE: Final = "calibration"
 """In the place of a file in the line of a mistake."""
 
@@ -33,9 +29,7 @@ WHERE: Final = "calibration"
 class Takeover:
     """Calibrates the run of a ring that was opened to ask (`RingReader`)."""
 
-    def __init__(
-        self, reader: RingReader, save: Path | None, sleep: Callable[[float], None] = time.sleep
-    ) -> None:
+    def __init__(self, reader: RingReader, save: Path | None, sleep: Sleep = time.sleep) -> None:
         self._reader, self._save, self._sleep = reader, save, sleep
         self._config: dict[str, Any] = reader.description["configuration"]
         self._log = structlog.get_logger("xcp")
@@ -68,27 +62,15 @@ class Takeover:
             config = config_of({**self._config, **tables}, WHERE)
         except UserError as error:
             raise self._refused(Error.OUT_OF_RANGE, str(error)) from None
-        ring = self._reader.ring
-        if not self._wait(lambda: ring.header["followed"][0] >= self.begins):
-            reason = "the calibration before is not recorded yet; try again"
-            raise self._refused(Error.RESOURCE_TEMPORARY_NOT_ACCESSIBLE, reason)
-        before = ring.header["calibration"][0]
-        number = ask(ring, new_params(config), tables, round(1e9 * (monotonic_s() + ANSWERS_IN_S)))
-        self._wait(lambda: ring.header["answered"][0] == number)
-        if ring.header["calibration"][0] == before:
+        try:
+            begins = taken_over(self._reader, new_params(config), tables, sleep=self._sleep)
+        except Busy as busy:
+            raise self._refused(Error.RESOURCE_TEMPORARY_NOT_ACCESSIBLE, str(busy)) from None
+        if begins is None:
             reason = "the car is armed and does not stand; stop, or calibrate a shadow"
             raise self._refused(Error.RESOURCE_TEMPORARY_NOT_ACCESSIBLE, reason)
-        self._tables, self.begins = tables, int(ring.header["calibrated_from"][0])
+        self._tables, self.begins = tables, begins
         self.pages[0], self.pages[1] = self.pages[1], self._record()[0]
-
-    def _wait(self, done: Callable[[], bool]) -> bool:
-        """Wait until it is done, at most twice the time in which the loop answers; return whether it is."""
-        end_s = monotonic_s() + 2 * ANSWERS_IN_S
-        while not done():
-            if monotonic_s() > end_s:
-                return False
-            self._sleep(LOOK_S)
-        return True
 
     def save(self, parameters: bytes) -> None:
         """Write PARAMETERS, which the loop has to go by, as a CONFIG file. Raises Refused."""

@@ -149,7 +149,7 @@ def test_a_thickness_that_grew_since_the_last_measurement_is_refused(tmp_path):
 
 
 def test_other_arguments_that_are_wrong(tmp_path):
-    with pytest.raises(UserError, match="choose front, rear or all"):
+    with pytest.raises(UserError, match="choose front, rear, all, fl, fr, rl, rr"):
         wear_command(CONFIG, tmp_path, "left", None)
     with pytest.raises(UserError, match="no such folder"):
         wear_command(CONFIG, tmp_path / "none", None, None)

@@ -8,6 +8,7 @@ import pytest
 
 from brakelab.replay.calibrated import changes_of
 from brakelab.replay.engine import new_ecu
+from ecu.contract.work import Kind, Work
 from ecu.errors import UserError
 from ecu.recording.calibration import Note
 from ecu.settings.config import load_config, new_params
@@ -43,6 +44,20 @@ def test_with_another_configuration_they_are_left_out_in_a_line(name: str, value
     assert changes == []
     assert line == "drive: 2 calibrations left out, for CONFIG is not the recorded one"
     assert changes_of(recorded(2000.0, notes=0), ecu) == ([], "")
+
+
+def test_new_pads_are_new_with_another_configuration_too() -> None:
+    ecu = new_ecu(new_params(CAR), None)
+    ecu.params["observer"] = 2
+    recording, work = recorded(2000.0, notes=2), Work(Kind.NEW_PADS, {"fl": 0.0})
+    recording.calibrations[1] = Note(2, 140, {}, work)
+    changes, line = changes_of(recording, ecu)
+    assert [(change.cycle, change.params is ecu.params, change.work) for change in changes] == [
+        (140, True, work)
+    ]
+    assert line == "drive: 1 calibrations left out, for CONFIG is not the recorded one"
+    del recording.calibrations[0]
+    assert changes_of(recording, ecu)[1] == ""
 
 
 def test_one_that_no_config_may_have_is_an_error() -> None:

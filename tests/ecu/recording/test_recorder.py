@@ -24,6 +24,7 @@ from ecu.contract.records import (
     OUTPUTS,
     new_record,
 )
+from ecu.contract.work import Kind, Work, to_record
 from ecu.errors import UserError
 from ecu.recording import store as state_store
 from ecu.recording.calibration import NOTES_FILE
@@ -104,13 +105,40 @@ def test_a_calibration_is_noted_once_also_by_the_recorder_that_takes_over(tmp_pa
     calibrate(run, 1, 3)
     run.cycles(2)
     run.cycles(2)
-    assert read_recording(tmp_path / "record").calibrations == [(1, 3, {"control": {"n": 1}})]
+    assert read_recording(tmp_path / "record").calibrations == [(1, 3, {"control": {"n": 1}}, None)]
     calibrate(run, 2, 7)
     run.recorder = Recorder(RingReader(run.ring.path), tmp_path / "record", None, again=True)
     run.cycles(1)
     run.recorder.finish()
     notes = read_recording(tmp_path / "record").calibrations
     assert [note[:2] for note in notes] == [(1, 3), (2, 7)]
+
+
+def test_work_is_stored_before_its_cycle_counts_as_handled_and_is_one_line(tmp_path):
+    """A change alone would wait for a minute."""
+    run = Run(tmp_path, record=tmp_path / "record", state=tmp_path / "state")
+    run.cycles(3)
+    run.learned["wear"]["odometer"] = 5.0
+    calibrate(run, 1, 4)
+    run.ring.pages["work"][0] = to_record(Work(Kind.NEW_PADS, {"fl": 0.0}))[0]
+    with capture_logs() as lines:
+        run.cycles(1)
+        assert kept(run) is None  # of the cycle before
+        run.cycles(1)
+    assert kept(run)["wear"]["odometer"] == 5.0
+    line = {"number": 1, "cycle": 4, "kind": "new_pads", "wear": {"fl": 0.0}}
+    assert [one for one in lines if one["event"] == "serviced"] == [
+        {**line, "event": "serviced", "log_level": "info"}
+    ]
+    run.recorder.finish()
+    found = read_recording(tmp_path / "record").calibrations
+    assert [note.work for note in found] == [Work(Kind.NEW_PADS, {"fl": 0.0})]
+
+
+def kept(run):
+    found = run.recorder.store.execute("SELECT record FROM learned WHERE key = ?", (run.recorder.key,))
+    row = found.fetchone()
+    return row and np.frombuffer(row[0], LEARNED)[0]
 
 
 def test_notes_that_are_none_make_no_recording(tmp_path):

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from ecu.algorithm.step import new_state
-from ecu.contract.records import INPUTS, new_record
-from ecu.recording.calibration import add_note, ask, in_force, read_notes
+from ecu.contract.records import INPUTS, OUTPUTS, new_record
+from ecu.contract.work import Kind, Work
+from ecu.recording.calibration import add_note, ask, check_of, in_force, read_notes
 from ecu.recording.ring import RingReader, create_ring
 from ecu.runtime.calibration import consider
 
 TABLES = {"control": {"max_pressure_rate": 2000.0}}
 NOW, LATER = 1_000, 2_000
+NEW_PADS = Work(Kind.NEW_PADS, {"fl": 0.0})
 
 
 @pytest.fixture
@@ -27,7 +29,8 @@ def ecu(params):
     params["transmit"] = 0
     state = new_state(params)
     state["estimate"]["started"] = 1
-    return SimpleNamespace(params=params, state=state, estimate=state["estimate"], inputs=new_record(INPUTS))
+    records = {"inputs": new_record(INPUTS), "outputs": new_record(OUTPUTS)}
+    return SimpleNamespace(params=params, state=state, estimate=state["estimate"], **records)
 
 
 def wanted(params):
@@ -67,6 +70,50 @@ def test_it_is_taken_over_by_a_shadow_or_standing(ring, ecu, armed, standing_s, 
         assert ecu.params.tobytes() == before
 
 
+@pytest.mark.requirement("REQ-WORK-1")
+@pytest.mark.parametrize("armed", [0, 1])
+@pytest.mark.parametrize(
+    ("standing_s", "started", "speed", "asked", "braking", "done"),
+    [
+        (0.5, 1, 0.0, 0.0, 0, True),
+        (0.49, 1, 0.0, 0.0, 0, False),
+        (9.9, 1, 0.3, 0.0, 0, False),
+        (9.9, 1, 30.0, 0.0, 0, False),
+        (9.9, 1, float("nan"), 0.0, 0, False),
+        (9.9, 0, 0.0, 0.0, 0, False),
+        (9.9, 1, 0.0, 0.05, 0, False),  # somebody is at the pedal, or holds the car
+        (9.9, 1, 0.0, float("nan"), 0, False),  # whether, nobody knows
+        (9.9, 1, 0.0, 0.0, 1, False),
+    ],
+)
+def test_a_workshop_works_on_a_car_that_stands_with_released_brakes(
+    ring, ecu, armed, standing_s, started, speed, asked, braking, done
+):
+    ecu.params["transmit"], ecu.state["demand"]["standing_s"] = armed, standing_s
+    ecu.estimate["started"], ecu.estimate["speed"] = started, speed
+    ecu.outputs["decel_demand_total"], ecu.state["application"]["braking"] = asked, braking
+    before = ecu.state.tobytes()
+    number = ask(ring, ecu.params, {}, LATER, NEW_PADS)
+    consider(ring, ecu, 70, NOW)
+    assert ring.header["answered"] == number
+    assert in_force(ring) == ((1, 70, {}, NEW_PADS) if done else None)
+    assert ecu.state["learned"]["wear"]["told"].tolist() == [[done, 0, 0, 0]]
+    assert (ecu.state.tobytes() == before) is not done
+    consider(ring, ecu, 80, NOW)
+    assert ring.header["calibrated_from"] == (70 if done else 0)
+
+
+def test_work_that_is_none_is_a_calibration(ring, ecu):
+    """Of another version: the loop neither does it nor ends."""
+    number = ask(ring, wanted(ecu.params), TABLES, LATER)
+    page = int(ring.asked["page"][0])
+    ring.pages["work"]["kind"][page] = 99
+    ring.asked["check"] = check_of(ring, page)
+    consider(ring, ecu, 70, NOW)
+    assert ring.header["answered"] == number
+    assert in_force(ring).work is None
+
+
 def test_what_is_the_runs_own_stays(ring, ecu):
     ecu.params["mapped"][0, :3] = 0
     mapped = ecu.params["mapped"].copy()
@@ -74,7 +121,7 @@ def test_what_is_the_runs_own_stays(ring, ecu):
     consider(ring, ecu, 70, NOW)
     assert ecu.params["transmit"] == 0
     assert np.array_equal(ecu.params["mapped"], mapped)
-    assert in_force(ring) == (1, 70, TABLES)
+    assert in_force(ring) == (1, 70, TABLES, None)
 
 
 def test_without_a_question_nothing_happens(ring, ecu):
@@ -109,11 +156,11 @@ def test_one_that_is_refused_leaves_the_one_before_readable(ring, ecu):
         ecu.params["transmit"] = 1
         ask(ring, ecu.params, {"control": {}}, LATER)
         consider(ring, ecu, 90, NOW)
-        assert in_force(ring) == (1, 70, TABLES)
+        assert in_force(ring) == (1, 70, TABLES, None)
     ecu.params["transmit"] = 0
     ask(ring, ecu.params, {"sensors": {}}, LATER)
     consider(ring, ecu, 100, NOW)
-    assert in_force(ring) == (2, 100, {"sensors": {}})
+    assert in_force(ring) == (2, 100, {"sensors": {}}, None)
 
 
 def test_only_who_asks_may_write(ring):
@@ -125,8 +172,13 @@ def test_only_who_asks_may_write(ring):
 
 def test_notes_read_back(tmp_path, ring, ecu):
     assert read_notes(tmp_path) == []
-    for number in (1, 2):
-        ask(ring, wanted(ecu.params), {"control": {"n": number}}, LATER)
+    ecu.state["demand"]["standing_s"] = 9.0
+    works = {1: None, 2: Work(Kind.MEASURED_PADS, {"fl": 1.5, "rr": -0.1})}
+    for number, work in works.items():
+        ask(ring, wanted(ecu.params), {"control": {"n": number}}, LATER, work)
         consider(ring, ecu, 100 * number, NOW)
         add_note(tmp_path, in_force(ring))
-    assert read_notes(tmp_path) == [(1, 100, {"control": {"n": 1}}), (2, 200, {"control": {"n": 2}})]
+    assert read_notes(tmp_path) == [
+        (1, 100, {"control": {"n": 1}}, None),
+        (2, 200, {"control": {"n": 2}}, works[2]),
+    ]

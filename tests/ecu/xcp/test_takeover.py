@@ -11,12 +11,12 @@ from ecu.algorithm.step import new_state
 from ecu.errors import UserError
 from ecu.recording.calibration import in_force
 from ecu.recording.ring import RingReader
+from ecu.runtime import asking
 from ecu.runtime.calibration import consider
 from ecu.runtime.clock import monotonic_s
 from ecu.runtime.xcp import SAVED
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource
-from ecu.xcp import takeover
 from ecu.xcp.parameters import PARAMETERS, to_record
 from ecu.xcp.protocol import Error, Refused
 from ecu.xcp.takeover import Takeover
@@ -61,7 +61,7 @@ class Calibrated:
 
 @pytest.fixture(autouse=True)
 def soon(monkeypatch):
-    monkeypatch.setattr(takeover, "ANSWERS_IN_S", 0.05)
+    monkeypatch.setattr(asking, "ANSWERS_IN_S", 0.05)
 
 
 @pytest.fixture
@@ -144,7 +144,7 @@ def test_one_that_is_not_recorded_yet_is_waited_for(calibrated, monkeypatch):
     monkeypatch.setattr(calibrated.takeover, "_sleep", lambda _: None)
     error, reason = calibrated.take(max_pressure_rate=2100.0)
     assert error == Error.RESOURCE_TEMPORARY_NOT_ACCESSIBLE
-    assert reason == "the calibration before is not recorded yet; try again"
+    assert reason == "the change before is not recorded yet; try again"
 
 
 def test_each_cycle_has_the_parameters_that_it_went_by(calibrated):

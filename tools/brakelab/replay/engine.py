@@ -30,7 +30,9 @@ from ecu.contract.signals import (
     N_OUTPUTS,
     USABLE,
 )
+from ecu.contract.work import Work
 from ecu.jit import Record, batch_kernel, kernel
+from ecu.workshop import do
 
 Block = TypeVar("Block")
 
@@ -58,12 +60,13 @@ class Ecu(NamedTuple):
 
 
 class Change(NamedTuple):
-    """Parameters that take the place of others."""
+    """Parameters that take the place of others, and what is done to the state then."""
 
     cycle: int
     """Number of the first that goes by them."""
     params: RecordArray
     """`PARAMS`, shape (1,)."""
+    work: Work | None = None
 
 
 class Rows(NamedTuple):
@@ -289,7 +292,7 @@ def _rows(ecu: Ecu, batches: Iterator[_Batch], changes: Iterable[Change] = ()) -
     for cycles, t, inputs in read_ahead(batches):
         part = slice(done, done + len(cycles))
         rows.t_ns[part], rows.t[part] = cycles["t_ns"], t
-        for begin, end in _pieces(cycles["number"], params, due):
+        for begin, end in _pieces(cycles["number"], params, ecu.state, due):
             part = slice(done + begin, done + end)
             _run(
                 params,
@@ -309,14 +312,19 @@ def _rows(ecu: Ecu, batches: Iterator[_Batch], changes: Iterable[Change] = ()) -
         yield Rows(rows.t_ns[:done], rows.t[:done], rows.values[:done], rows.samples[:done])
 
 
-def _pieces(numbers: NDArray[np.int64], params: RecordArray, due: deque[Change]) -> Iterator[tuple[int, int]]:
-    """Yield the pieces of a batch that go by the same parameters, and exchange `params` between them."""
+def _pieces(
+    numbers: NDArray[np.int64], params: RecordArray, state: RecordArray, due: deque[Change]
+) -> Iterator[tuple[int, int]]:
+    """Yield the pieces of a batch between changes, and make these to `params` and `state`."""
     begin = 0
     while due and due[0].cycle <= numbers[-1]:
         end = int(np.searchsorted(numbers, due[0].cycle))
         if end > begin:
             yield begin, end
-        params[:] = due.popleft().params
+        change = due.popleft()
+        params[:] = change.params
+        if change.work is not None:
+            do(change.work, params, state)
         begin = end
     yield begin, len(numbers)
 
