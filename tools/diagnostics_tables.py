@@ -20,7 +20,8 @@ _SERVICES: Final = {
     services.READ_DATA: ("ReadDataByIdentifier", f"up to {services.MOST_IDENTIFIERS} at once"),
     services.SECURITY_ACCESS: ("SecurityAccess", "01 seed, 02 key; with a key file"),
     services.COMMUNICATION_CONTROL: ("CommunicationControl", "refused"),
-    services.ROUTINE_CONTROL: ("RoutineControl", "01 start, 03 results"),
+    services.WRITE_DATA: ("WriteDataByIdentifier", "0118, with access; 0x78 first, as the loop is asked"),
+    services.ROUTINE_CONTROL: ("RoutineControl", "01 start; of the self-test 03 results; 0x78 as there"),
     services.TESTER_PRESENT: ("TesterPresent", "00"),
     services.DTC_SETTING: ("ControlDTCSetting", "01 on, 02 off; on again with the end of the session"),
 }
@@ -51,6 +52,7 @@ def _services() -> list[str]:
         *lines,
         "",
         f"Routines: {routines}.",
+        "New pads have a byte with a bit of each corner, 01 fl, 02 fr, 04 rl, 08 rr. Both ask for access.",
         f"The self-test has a byte (0 passed, 1 failed, 2 not tested) for each of: {results}.",
         "",
         f"Snapshot records {read_faults.FIRST:02X}, {read_faults.LAST:02X}; extended data"

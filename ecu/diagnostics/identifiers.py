@@ -43,6 +43,10 @@ class Identifier(NamedTuple):
     """Where the database has none."""
 
 
+PAD_THICKNESS: Final = Identifier(
+    0x0118, "pad_thickness", scaling=Scaling(0.01, 0.0, 0, 0xFFFE, 2, not_available=0xFFFF)
+)
+"""Of the linings; it is written, too: what a workshop measured, "not available" where it did not."""
 _COUNT: Final = Scaling(1.0, 0.0, 0, (1 << 32) - 1, 4)
 MEASURED: Final = (
     Identifier(0x0100, "mode", "mode"),
@@ -63,6 +67,7 @@ MEASURED: Final = (
     Identifier(0x0115, "disc_temperature", "disc_temperature"),
     Identifier(0x0116, "pad_wear", "pad_wear"),
     Identifier(0x0117, "pad_remaining", "pad_remaining"),
+    PAD_THICKNESS,
     Identifier(0x0120, "clock", scaling=Scaling(0.001, 0.0, 0, (1 << 48) - 1, 6)),
     Identifier(0x0121, "t", scaling=Scaling(0.001, 0.0, 0, (1 << 48) - 1, 6)),
     Identifier(0x0122, "lateness", scaling=_COUNT),
@@ -73,6 +78,7 @@ BY_NAME: Final = {one.name: one for one in MEASURED}
 BY_NUMBER: Final = {one.number: one for one in MEASURED}
 UNITS: Final = {
     **{signal.name: signal.unit for signal in OUTPUT_SIGNALS},
+    "pad_thickness": "mm",
     "clock": "s since 1970",
     "t": "s",
     "lateness": "us",
@@ -95,7 +101,7 @@ OF_SNAPSHOT: Final = tuple(
     for name in ("clock", "vehicle_speed", "decel_demand_total", "mode", "calliper_pressure", "mu_b")
 )
 
-_OF_CORNERS: Final = {signal.name for signal in OUTPUT_SIGNALS if signal.corners}
+_OF_CORNERS: Final = {signal.name for signal in OUTPUT_SIGNALS if signal.corners} | {PAD_THICKNESS.name}
 
 
 def has_corners(one: Identifier) -> bool:
@@ -154,11 +160,14 @@ def to_values(one: Identifier, text: bytes) -> list[float | None]:
     return values
 
 
-def measured(record: RecordArray) -> Mapping[str, "np.ndarray | float"]:
-    """Return the quantities of one cycle (`RECORDED`, shape (1,)) by name."""
+def measured(
+    record: RecordArray, new_pads: "np.ndarray | float" = np.nan
+) -> Mapping[str, "np.ndarray | float"]:
+    """Return the quantities of one cycle (`RECORDED`, shape (1,)) by name; `new_pads`: thickness [mm]."""
     cycle, outputs = record["cycle"][0], record["outputs"][0]
     return {
         **{one.name: outputs[one.name] for one in MEASURED if one.name in outputs.dtype.names},
+        PAD_THICKNESS.name: new_pads - outputs["pad_wear"],
         "clock": 1e-9 * float(cycle["t_ns"] + cycle["clock_set_ns"]),
         "t": 1e-9 * float(cycle["t_mono_ns"]),
         "lateness": 1e-3 * float(cycle["lateness_ns"]),

@@ -16,12 +16,14 @@ import structlog
 from ecu.contract.faults import NOT_KEPT, fault_mask
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import STARTING
+from ecu.contract.work import Kind
 from ecu.diagnostics.fault_memory import FaultMemory
 from ecu.diagnostics.identifiers import BY_NUMBER, TEXTS, measured, snapshot, to_bytes
 from ecu.diagnostics.memory_file import MemoryFile, Place, take_over, to_record
 from ecu.diagnostics.services import pending, respond
 from ecu.diagnostics.session import P2_STAR_MS, SEED_BYTES, Ecu, Session, in_time
 from ecu.diagnostics.transport import Request
+from ecu.diagnostics.workshop import Workshop
 from ecu.recording.events import INPUT_FAULTS
 from ecu.recording.ring import Batch, RingReader
 from ecu.runtime.clock import monotonic_s
@@ -54,9 +56,9 @@ class Server:
         """Go on where an earlier process of this run was, or begin an operation cycle.
 
         Raises:
-            UserError: there is no ring.
+            UserError: there is no ring, or its configuration is none.
         """
-        self.reader = RingReader(ring)
+        self.reader = RingReader(ring, asks=bool(secret))
         about = self.reader.description
         self._ring, self._now_s = ring, now_s
         self.memory = FaultMemory()
@@ -73,6 +75,9 @@ class Server:
             "configuration": str(about["config_hash"]),
             "vehicle": str(about["name"]),
         }
+        axles = [about["configuration"][axle]["pad"]["thickness_new"] for axle in ("front", "rear")]
+        self._new_pads = np.repeat(axles, 2)
+        self._workshop = Workshop(self.reader, kept=state is not None) if secret else None
         self._ecu = Ecu(
             self.memory,
             armed=bool(about["armed"]),
@@ -80,6 +85,7 @@ class Server:
             clear=self._clear,
             clearing_lasts=self._file is not None,
             self_test=self._self_test,
+            work=self._work,
             can_restart=self._can_restart,
             new_seed=lambda: secrets.token_bytes(SEED_BYTES),
             secret=secret,
@@ -139,7 +145,7 @@ class Server:
         self.follow()
         if not self.speaks:
             return
-        first = pending(request.data, self._ecu)
+        first = pending(self.session, request.data, self._ecu)
         if first:
             yield first
         session, response = respond(
@@ -168,13 +174,17 @@ class Server:
             return self._texts[TEXTS[number]].encode()
         if number in BY_NUMBER:
             assert self.last is not None
-            return to_bytes(BY_NUMBER[number], measured(self.last))
+            return to_bytes(BY_NUMBER[number], measured(self.last, self._new_pads))
         return None
 
     def _clear(self, number: int | None) -> bool:
         self.memory.clear(number)
         self._save()
         return self._file is None or self._file.is_saved(STORED_WITHIN_S)
+
+    def _work(self, kind: Kind, values: dict[str, float]) -> None:
+        assert self._workshop is not None  # without a secret nobody gets access
+        self._workshop.do(kind, values)
 
     def _can_restart(self) -> bool:
         return "NOTIFY_SOCKET" in os.environ and is_held(self._ring)

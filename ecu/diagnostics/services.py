@@ -2,15 +2,18 @@
 
 `respond` is a function of session, request, time and what `Ecu` gives: it sends and waits for nothing.
 Refused whatever the session: ECUReset while the ECU is armed (its demands would be gone until it is back),
-and CommunicationControl (its frames are the demands: a tester's word must not end them). Not built: 0x2E,
-for there is nothing that may be written beside a running loop.
+and CommunicationControl (its frames are the demands: a tester's word must not end them). What a workshop
+writes or does to the learned values reaches the loop while the car stands with released brakes alone: the
+loop itself decides that.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
+from ecu.contract.signals import CORNERS
+from ecu.contract.work import Kind
 from ecu.diagnostics import read_faults
-from ecu.diagnostics.identifiers import SESSION
+from ecu.diagnostics.identifiers import PAD_THICKNESS, SESSION, length_of, to_values
 from ecu.diagnostics.session import (
     ACCESS_DENIED,
     CONDITIONS_NOT_CORRECT,
@@ -45,6 +48,7 @@ READ_FAULTS: Final = 0x19
 READ_DATA: Final = 0x22
 SECURITY_ACCESS: Final = 0x27
 COMMUNICATION_CONTROL: Final = 0x28
+WRITE_DATA: Final = 0x2E
 ROUTINE_CONTROL: Final = 0x31
 TESTER_PRESENT: Final = 0x3E
 DTC_SETTING: Final = 0x85
@@ -68,6 +72,8 @@ ROUTINES: Final = {
     FORGET: "forget what was learned",
 }
 START, RESULTS = 0x01, 0x03
+WORKS: Final = {NEW_PADS: (Kind.NEW_PADS, 5), FORGET: (Kind.FORGET, 4)}
+"""Routines of a workshop: what is done, bytes of the request; of new pads the last has a bit a corner."""
 ON, OFF = 0x01, 0x02
 
 Handler = Callable[[Session, bytes, Ecu, float], tuple[Session, bytes]]
@@ -150,16 +156,46 @@ def _routine_control(session: Session, request: bytes, ecu: Ecu, now_s: float) -
     kind, routine = request[1] & ~SUPPRESS, int.from_bytes(request[2:4], "big")
     if routine not in ROUTINES:
         raise Refused(OUT_OF_RANGE)
-    if routine != SELF_TEST and not session.unlocked:
-        raise Refused(ACCESS_DENIED)
-    if routine != SELF_TEST:  # the loop would write over it, see docs/diagnostics.md
-        raise Refused(CONDITIONS_NOT_CORRECT)
+    if routine in WORKS:
+        ecu.work(*_work(session, request))
+        return session, bytes([kind]) + request[2:4]
     _length(request, 4)
     if kind == START:
         session = session._replace(tested=ecu.self_test())
     elif not session.tested:
         raise Refused(SEQUENCE_ERROR)
     return session, bytes([kind]) + request[2:4] + session.tested
+
+
+def _write_data(session: Session, request: bytes, ecu: Ecu, now_s: float) -> tuple[Session, bytes]:
+    ecu.work(*_work(session, request))
+    return session, request[1:3]
+
+
+def _work(session: Session, request: bytes) -> tuple[Kind, dict[str, float]]:
+    """Return the work that a request to write, or to start a routine, asks for. Raises Refused."""
+    if request[0] == WRITE_DATA:
+        if len(request) < 4:
+            raise Refused(INCORRECT_LENGTH)
+        if int.from_bytes(request[1:3], "big") != PAD_THICKNESS.number:
+            raise Refused(OUT_OF_RANGE)
+        kind, length = Kind.MEASURED_PADS, 3 + length_of(PAD_THICKNESS)
+    elif request[1] & ~SUPPRESS != START:
+        raise Refused(SUBFUNCTION_NOT_SUPPORTED)
+    else:
+        kind, length = WORKS[int.from_bytes(request[2:4], "big")]
+    if not session.unlocked:
+        raise Refused(ACCESS_DENIED)
+    _length(request, length)
+    values: Sequence[float | None] = ()
+    if kind == Kind.MEASURED_PADS:
+        values = to_values(PAD_THICKNESS, request[3:])
+    elif kind == Kind.NEW_PADS and request[4] < 1 << len(CORNERS):
+        values = [0.0 if request[4] >> i & 1 else None for i in range(len(CORNERS))]
+    done = {corner: value for corner, value in zip(CORNERS, values, strict=False) if value is not None}
+    if not done and kind != Kind.FORGET:
+        raise Refused(OUT_OF_RANGE)
+    return kind, done
 
 
 def _tester_present(session: Session, request: bytes, ecu: Ecu, now_s: float) -> tuple[Session, bytes]:
@@ -181,6 +217,7 @@ SERVICES: Final = {
     READ_DATA: Service(_read_data),
     SECURITY_ACCESS: Service(_security_access, (0x01, 0x02), in_default=False),
     COMMUNICATION_CONTROL: Service(_communication_control, (0x00, 0x01, 0x02, 0x03), in_default=False),
+    WRITE_DATA: Service(_write_data, in_default=False),
     ROUTINE_CONTROL: Service(_routine_control, (START, RESULTS), in_default=False),
     TESTER_PRESENT: Service(_tester_present, (0x00,)),
     DTC_SETTING: Service(_dtc_setting, (ON, OFF), in_default=False),
@@ -236,9 +273,23 @@ def _allowed(session: Session, request: bytes) -> Service:
     return service
 
 
-def pending(request: bytes, ecu: Ecu) -> bytes:
+def pending(session: Session, request: bytes, ecu: Ecu) -> bytes:
     """Return what to send before the response, as that may come later than P2; empty: it comes in time."""
+    if _is_work(session, request):
+        return negative(request[0], PENDING)
     group = int.from_bytes(request[1:4], "big")
     clears = request[:1] == bytes([CLEAR]) and len(request) == 4
     lasts = clears and ecu.clearing_lasts and (group == ALL_GROUPS or group in ecu.memory.entries)
     return negative(CLEAR, PENDING) if lasts else b""
+
+
+def _is_work(session: Session, request: bytes) -> bool:
+    """Return whether the loop will be asked."""
+    if not session.unlocked or not request:
+        return False
+    try:
+        service = _allowed(session, request)
+        routine = service.handle is _routine_control and int.from_bytes(request[2:4], "big") in WORKS
+        return (service.handle is _write_data or routine) and bool(_work(session, request))
+    except Refused:
+        return False

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
+from ecu.contract.work import Kind
 from ecu.diagnostics.fault_memory import FaultMemory
 
 DEFAULT: Final = 0x01
@@ -21,6 +22,7 @@ SERVICE_NOT_SUPPORTED: Final = 0x11
 SUBFUNCTION_NOT_SUPPORTED: Final = 0x12
 INCORRECT_LENGTH: Final = 0x13
 RESPONSE_TOO_LONG: Final = 0x14
+BUSY: Final = 0x21
 CONDITIONS_NOT_CORRECT: Final = 0x22
 SEQUENCE_ERROR: Final = 0x24
 OUT_OF_RANGE: Final = 0x31
@@ -37,6 +39,7 @@ REASONS: Final = {
     SUBFUNCTION_NOT_SUPPORTED: "subFunctionNotSupported",
     INCORRECT_LENGTH: "incorrectMessageLengthOrInvalidFormat",
     RESPONSE_TOO_LONG: "responseTooLong",
+    BUSY: "busyRepeatRequest",
     CONDITIONS_NOT_CORRECT: "conditionsNotCorrect",
     SEQUENCE_ERROR: "requestSequenceError",
     OUT_OF_RANGE: "requestOutOfRange",
@@ -104,6 +107,11 @@ class Ecu(NamedTuple):
     clearing_lasts: bool
     """A response may come later than P2: it is stored."""
     self_test: Callable[[], bytes]
+    work: Callable[[Kind, dict[str, float]], None]
+    """Do what a workshop does to the learned values, by corner: thicknesses of measured pads [mm].
+
+    Raises Refused.
+    """
     can_restart: Callable[[], bool]
     new_seed: Callable[[], bytes]
     secret: bytes

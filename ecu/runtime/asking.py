@@ -20,7 +20,7 @@ Sleep = Callable[[float], None]
 
 
 class Busy(Exception):
-    """Another change is under way: ask again."""
+    """Another change is in progress: ask again."""
 
 
 def taken_over(

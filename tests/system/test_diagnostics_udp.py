@@ -87,8 +87,8 @@ def test_a_foreign_tester_reads_clears_tests_and_gets_access(unit, tmp_path):
         with pytest.raises(NegativeResponseException, match="SecurityAccessDenied"):
             client.start_routine(0x0201)
         client.unlock_security_access(1)
-        with pytest.raises(NegativeResponseException, match="ConditionsNotCorrect"):
-            client.start_routine(0x0201)
+        with pytest.raises(NegativeResponseException, match="ConditionsNotCorrect"):  # it drives
+            client.start_routine(0x0201, b"\x03")
         with pytest.raises(NegativeResponseException, match="ConditionsNotCorrect"):
             client.ecu_reset(1)
         assert client.start_routine(SELF_TEST).service_data.routine_status_record[0] == 0

@@ -35,7 +35,10 @@ class Numbers(udsoncan.DidCodec):
         ]
 
     def encode(self, value):
-        raise NotImplementedError
+        """Bytes of four values, None: not available."""
+        none, scale = self.scaling.not_available, self.scaling.scale
+        raw = [none if one is None else round((one - self.scaling.offset) / scale) for one in value]
+        return b"".join(one.to_bytes(self.scaling.bytes, "big", signed=self.scaling.signed) for one in raw)
 
     def __len__(self):
         return length_of(self.one)

@@ -6,7 +6,7 @@ import pytest
 
 from ecu.diagnostics.fault_memory import FaultMemory
 from ecu.diagnostics.services import respond
-from ecu.diagnostics.session import Ecu, Session
+from ecu.diagnostics.session import Ecu, Refused, Session
 
 from ..watch.conftest import loop, rings
 
@@ -35,6 +35,8 @@ def world():
         stores=True,
         restartable=True,
         seeds=iter(bytes([n] * 16) for n in range(1, 200)),
+        works=[],
+        refuses=None,
         read={0x0103: b"\x00\x27\x10", 0xF189: b"1.2.3", 0xF1A1: b"v" * 250},
     )
 
@@ -47,6 +49,11 @@ def tester(world):
         world.memory.clear(number)
         return world.stores
 
+    def work(kind, values):
+        if world.refuses is not None:
+            raise Refused(world.refuses)
+        world.works.append((kind.name, values))
+
     def begin(**fields):
         ecu = Ecu(
             memory=world.memory,
@@ -55,6 +62,7 @@ def tester(world):
             clear=clear,
             clearing_lasts=True,
             self_test=lambda: b"\x00\x00\x00\x00",
+            work=work,
             can_restart=lambda: world.restartable,
             new_seed=lambda: next(world.seeds),
             secret=SECRET,

@@ -11,6 +11,8 @@ from ecu.diagnostics.fault_memory import CONFIRMED, TEST_FAILED
 from ecu.diagnostics.server import FAILED, NOT_TESTED, PASSED, SELF_TESTS, Server
 from ecu.diagnostics.transport import Request
 from ecu.diagnostics.trouble_codes import TROUBLE_CODES
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
 
 from ..watch.conftest import MONO_NS, START_NS
 
@@ -19,6 +21,7 @@ ABOUT = {
     "versions": {"brake-ecu": "1.2.3"},
     "config_hash": "0123456789abcdef",
     "armed": True,
+    "configuration": load_config(resource("config/suv.toml")).model_dump(),
 }
 READY, STARTING = 1, 0
 NUMBERS = {code.fault.bit: code.number for code in TROUBLE_CODES}
@@ -77,6 +80,12 @@ def test_what_is_read_is_of_the_last_cycle(begin):
     texts = {"F1 89": "1.2.3", "F1 97": "brake-ecu", "F1 A0": "0123456789abcdef", "F1 A1": "suv"}
     for number, text in texts.items():
         assert ask(server, f"22 {number}") == [f"62 {number} {text.encode().hex(' ').upper()}"]
+
+
+def test_pads_are_as_thick_as_new_less_their_wear(begin):
+    run, server = begin()
+    run.publish(1, mode=READY, pad_wear=[0.5, 1.0, 0.0, float("nan")])
+    assert ask(server, "22 01 18") == ["62 01 18 04 7E 04 4C 04 B0 FF FF"]
 
 
 @pytest.mark.parametrize("speaks", [0, 1])

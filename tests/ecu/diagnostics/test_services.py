@@ -87,8 +87,17 @@ EXCHANGES = {
     "silence in the default session": ((), "28 03 01", "7F 28 7F", {}),
     "silence, too short": (LOCKED, "28 03", "7F 28 13", {}),
     "silence, another kind": (LOCKED, "28 05 01", "7F 28 12", {}),
-    # 0x2E and others that there are not
-    "write": (UNLOCKED, "2E 01 03 00 00 00", "7F 2E 11", {}),
+    # 0x2E WriteDataByIdentifier
+    "pads measured": (UNLOCKED, "2E 01 18 03 D4 FF FF FF FF 04 4C", "6E 01 18", {}),
+    "write, locked": (LOCKED, "2E 01 18" + " 03 D4" * 4, "7F 2E 33", {}),
+    "write in the default session": ((), "2E 01 18" + " 03 D4" * 4, "7F 2E 7F", {}),
+    "write what is read alone": (UNLOCKED, "2E 01 03 00 00 00", "7F 2E 31", {}),
+    "write what there is not": (LOCKED, "2E F1 90 00", "7F 2E 31", {}),
+    "write, no data": (UNLOCKED, "2E 01 18", "7F 2E 13", {}),
+    "write, too short": (UNLOCKED, "2E 01 18 03 D4", "7F 2E 13", {}),
+    "write, too long": (UNLOCKED, "2E 01 18" + " 03 D4" * 4 + " 00", "7F 2E 13", {}),
+    "write of no corner": (UNLOCKED, "2E 01 18" + " FF FF" * 4, "7F 2E 31", {}),
+    # another that there is not
     "upload": (UNLOCKED, "35 00 44", "7F 35 11", {}),
     # 0x31 RoutineControl
     "self-test": (LOCKED, "31 01 02 00", "71 01 02 00 00 00 00 00", {}),
@@ -97,9 +106,16 @@ EXCHANGES = {
     "stop it": (LOCKED, "31 02 02 00", "7F 31 12", {}),
     "self-test in the default session": ((), "31 01 02 00", "7F 31 7F", {}),
     "new pads, locked": (LOCKED, "31 01 02 01", "7F 31 33", {}),
-    "new pads beside a loop": (UNLOCKED, "31 01 02 01", "7F 31 22", {}),
+    "new pads in front": (UNLOCKED, "31 01 02 01 03", "71 01 02 01", {}),
+    "new pads, quietly": (UNLOCKED, "31 81 02 01 0F", "", {}),
+    "new pads nowhere": (UNLOCKED, "31 01 02 01 00", "7F 31 31", {}),
+    "new pads of a fifth wheel": (UNLOCKED, "31 01 02 01 11", "7F 31 31", {}),
+    "new pads, no corners": (UNLOCKED, "31 01 02 01", "7F 31 13", {}),
+    "new pads, too long": (UNLOCKED, "31 01 02 01 03 00", "7F 31 13", {}),
+    "new pads, their result": (UNLOCKED, "31 03 02 01", "7F 31 12", {}),
     "forget, locked": (LOCKED, "31 01 02 02", "7F 31 33", {}),
-    "forget beside a loop": (UNLOCKED, "31 01 02 02", "7F 31 22", {}),
+    "forget": (UNLOCKED, "31 01 02 02", "71 01 02 02", {}),
+    "forget, too long": (UNLOCKED, "31 01 02 02 00", "7F 31 13", {}),
     "no such routine": (LOCKED, "31 01 03 00", "7F 31 31", {}),
     "half a routine": (LOCKED, "31 01 02", "7F 31 13", {}),
     # 0x3E TesterPresent, 0x85 ControlDTCSetting
@@ -249,7 +265,36 @@ def test_a_clear_that_cannot_be_stored_is_no_success(tester, world):
 )
 def test_a_response_that_may_be_late_is_preceded_by_pending(request_, lasts, first, tester):
     ecu = tester(clearing_lasts=lasts).ecu
-    assert pending(bytes.fromhex(request_), ecu) == bytes.fromhex(first)
+    assert pending(Session(), bytes.fromhex(request_), ecu) == bytes.fromhex(first)
+
+
+@pytest.mark.parametrize(("before", "request_", "response", "ecu"), EXCHANGES.values(), ids=EXCHANGES)
+def test_pending_comes_before_the_loop_is_asked_and_only_then(before, request_, response, ecu, tester, world):
+    one = tester(**ecu)
+    for earlier in before:
+        ask(one, earlier)
+    first = pending(one.session, bytes.fromhex(request_) if request_ != "key" else b"", one.ecu)
+    ask(one, request_)
+    assert (first[:1] + first[2:] == b"\x7f\x78" and request_[:2] != "14") == bool(world.works)
+
+
+@pytest.mark.parametrize(
+    ("request_", "works"),
+    [
+        ("2E 01 18 03 D4 FF FF FF FF 04 4C", ("MEASURED_PADS", {"fl": 9.8, "rr": 11.0})),
+        ("31 01 02 01 06", ("NEW_PADS", {"fr": 0.0, "rl": 0.0})),
+        ("31 01 02 02", ("FORGET", {})),
+    ],
+)
+def test_what_a_workshop_asks_for_is_done_or_refused_by_the_loop(request_, works, tester, world):
+    one = tester()
+    for request in UNLOCKED:
+        ask(one, request)
+    ask(one, request_)
+    assert world.works == [works]
+    for code in (0x21, 0x22, 0x31, 0x72):
+        world.refuses = code
+        assert ask(one, request_) == f"7F {request_[:2]} {code:02X}"
 
 
 def test_a_snapshot_names_its_quantities_as_the_server_counts_them():
@@ -274,7 +319,7 @@ REQUEST = st.one_of(
 
 @given(st.lists(st.tuples(REQUEST, st.booleans(), st.sampled_from([0.0, 0.1, 3.0, 6.0])), max_size=12))
 def test_any_bytes_give_a_valid_response_or_none(requests):
-    memory = FaultMemory()
+    memory, worked = FaultMemory(), []
     ecu = Ecu(
         memory,
         armed=False,
@@ -282,6 +327,7 @@ def test_any_bytes_give_a_valid_response_or_none(requests):
         clear=lambda number: (memory.clear(number), True)[1],
         clearing_lasts=False,
         self_test=lambda: b"\x00",
+        work=lambda kind, values: worked.append((kind, values)),
         can_restart=lambda: True,
         new_seed=lambda: bytes(range(16)),
         secret=SECRET,
@@ -289,7 +335,9 @@ def test_any_bytes_give_a_valid_response_or_none(requests):
     session, now_s = Session(), 0.0
     for request, functional, pause_s in requests:
         now_s += pause_s
+        before = len(worked)
         session, response = respond(session, request, ecu, now_s, functional)
+        assert len(worked) == before or session.unlocked
         assert is_valid(request, response), (request.hex(" "), response.hex(" "))
         assert session.kind in (1, 3)
         assert not (session.unlocked and session.kind == 1)
