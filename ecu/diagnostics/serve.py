@@ -33,7 +33,8 @@ def serve(ring: Path, state: Path | None, settings: Settings, goes_on: Callable[
         UserError: there is no ring, or the key file has become none.
     """
     secret = read_secret(Path(settings.key)) if settings.key else b""
-    server, place = Server(ring, state, secret), _place(settings)
+    place = _place(settings)
+    server = Server(ring, state, secret, sleep=lambda seconds: _listen(place, seconds))
     due_s = 0.0
     while goes_on() and not server.reader.closed:
         _turn(server, place)
@@ -42,6 +43,15 @@ def serve(ring: Path, state: Path | None, settings: Settings, goes_on: Callable[
             due_s = time.monotonic() + PERIOD_S
     server.finish()
     place.close()
+
+
+def _listen(place: Place[Link], seconds: float) -> None:
+    """Wait and take in what comes: a socket that nobody reads would lose the next request."""
+    link = place.end()
+    if link is None:
+        time.sleep(seconds)
+    else:
+        link.turn(seconds)
 
 
 def _turn(server: Server, place: Place[Link]) -> None:

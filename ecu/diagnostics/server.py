@@ -26,6 +26,7 @@ from ecu.diagnostics.transport import Request
 from ecu.diagnostics.workshop import Workshop
 from ecu.recording.events import INPUT_FAULTS
 from ecu.recording.ring import Batch, RingReader
+from ecu.runtime.asking import Sleep
 from ecu.runtime.clock import monotonic_s
 from ecu.watch.daemons import is_held, pid_of
 from ecu.watch.health import ailment
@@ -52,8 +53,11 @@ class Server:
         state: Path | None,
         secret: bytes,
         now_s: Callable[[], float] = time.monotonic,
+        sleep: Sleep = time.sleep,
     ) -> None:
         """Go on where an earlier process of this run was, or begin an operation cycle.
+
+        `sleep` waits for the loop.
 
         Raises:
             UserError: there is no ring, or its configuration is none.
@@ -77,7 +81,7 @@ class Server:
         }
         axles = [about["configuration"][axle]["pad"]["thickness_new"] for axle in ("front", "rear")]
         self._new_pads = np.repeat(axles, 2)
-        self._workshop = Workshop(self.reader, kept=state is not None) if secret else None
+        self._workshop = Workshop(self.reader, kept=state is not None, sleep=sleep) if secret else None
         self._ecu = Ecu(
             self.memory,
             armed=bool(about["armed"]),

@@ -3,7 +3,7 @@
 import os
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any, Final
 
 from ecu.contract.records import RecordArray
@@ -68,12 +68,11 @@ def _alone(ring: Ring) -> Iterator[None]:
     """Keep other processes from asking: a record lock, which is none of those of `recording/lock.py`."""
     import fcntl  # as there
 
-    try:
-        handle = open_own(ring.path, os.O_RDWR)
+    with ExitStack() as stack:
         try:
+            handle = open_own(ring.path, os.O_RDWR)
+            stack.callback(os.close, handle)
             fcntl.lockf(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            yield
-        finally:
-            os.close(handle)
-    except OSError:
-        raise Busy("another process asks for a change, or the run has ended; try again") from None
+        except OSError:
+            raise Busy("another process asks for a change, or the run has ended; try again") from None
+        yield
