@@ -1,5 +1,6 @@
 """`brake-ecu diag`: options of the command."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -42,3 +43,13 @@ def diag(
     from ecu.diagnostics import tester
 
     return tester.diag(action, names or [], interface, channel, ids)
+
+
+@app.command()
+def pdx(
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="File to write")],
+) -> int:
+    """Write the PDX file of `run --diagnostics` (ODX, ISO 22901-1)."""
+    from ecu.diagnostics import pdx
+
+    return pdx.pdx(out)
