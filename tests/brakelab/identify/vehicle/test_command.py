@@ -94,6 +94,9 @@ def test_a_configuration_a_page_and_a_picture_are_written(car, tmp_path, capsys)
     said = capsys.readouterr()
     assert "next: brake-ecu replay" in said.err.splitlines()[-1]
     assert "offset =" in said.out
+    (checked,) = [line for line in said.out.splitlines() if "predicted from the others" in line]
+    assert f"{checked}." in page
+    assert f"# {checked}\n" in out.read_text("utf-8")
     printed = [line for line in said.out.splitlines() if " ± " in line]
     rough = [line.split(" = ")[0].rpartition(".")[2] for line in printed if ", rough" in line]
     marked = [line for line in out.read_text("utf-8").splitlines() if ", rough" in line]

@@ -20,7 +20,7 @@ LEFT = Parameter("rear.mu_nominal", "-", 0.45, 0.45, 0.1, 0, "brakes", "brakings
 
 def written(tmp_path, start: Path, *parameters: Parameter):
     out = tmp_path / "cars" / "mine.toml"
-    kept = write_vehicle(start, out, parameters, load_config(start), ["a.log"])
+    kept = write_vehicle(start, out, parameters, load_config(start), ["a.log"], "2 brake applications")
     return load_config(out), out.read_text("utf-8"), kept
 
 
@@ -33,6 +33,7 @@ def test_fitted_keys_are_written_and_the_rest_is_start(tmp_path):
     assert "mass = 1990 # kg, ± 20; motor torque; 300 half seconds; was 2105" in text
     assert "slip_stiffness = 24.5 # ± 2, rough" in text
     assert "# rear.mu_nominal = 0.45 -: needs brakings" in text
+    assert "# 2 brake applications\n" in text
 
 
 def test_a_start_that_includes_another_is_written_out(tmp_path):

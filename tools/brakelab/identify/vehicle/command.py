@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from brakelab.identify.vehicle.config_file import map_toml, offsets, write_vehicle
+from brakelab.identify.vehicle.cross_check import cross_check, keep_start
 from brakelab.identify.vehicle.page import write_page
 from brakelab.identify.vehicle.parameters import parameters_of
 from brakelab.identify.vehicle.reader import read_drives
@@ -30,16 +31,18 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
     params = new_params(start)
     found = identify(read_drives(drives, params, map), params, closed)
     names = [drive.name for drive in drives]
-    parameters = write_vehicle(config, out, parameters_of(found, start), start, names)
+    check = cross_check(found.residuals, found.known, found.fit.theta)
+    parameters = keep_start(parameters_of(found, start), check)
+    parameters = write_vehicle(config, out, parameters, start, names, check.line)
     try:
         load_config(out)
     except UserError as error:
         say(f"{error}")
-    write_page(page, found, parameters, params[0], names)
+    write_page(page, found, parameters, params[0], names, check.line)
     zeros = offsets(found.zeros)
     if map and zeros:
         own_map.write_text(map_toml(map, own_map, zeros), encoding="utf-8")
-    give(parameters=parameters, zeros=zeros)
+    give(parameters=parameters, zeros=zeros, cross_check=check)
     for one in parameters:
         unit = "" if one.unit == "-" else f" {one.unit}"
         if one.remedy:
@@ -47,6 +50,8 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
         else:
             value = f"{one.value:.5g} ± {one.sigma:.2g}{unit}{one.doubt}"
             print(f"{one.key} = {value} ({one.source}; was {one.start:.5g})")
+    if check.line:
+        print(check.line)
     for name, zero in zeros.items():
         print(
             f"{name}: reads {zero:+.4g} at 0"

@@ -31,9 +31,10 @@ def sections_of(parameters: Sequence[Parameter], config: Config) -> dict[str, Se
     return sections
 
 
-def head_of(parameters: Sequence[Parameter], start: str, drives: Sequence[str]) -> str:
-    """Return the first lines of CAR: where its keys are from, and which no drive identified."""
+def head_of(parameters: Sequence[Parameter], start: str, drives: Sequence[str], checked: str) -> str:
+    """Return the first lines of CAR: where its keys are from, how they predict, which no drive identified."""
     lines = [f"# Identified by `brake-ecu identify vehicle` from {', '.join(drives)}; ± is 1 σ."]
+    lines += [f"# {checked}"] if checked else []
     if left := [one for one in parameters if one.remedy]:
         lines += [f"# Not identified, {start}'s value:"]
         lines += [f"# {one.key} = {one.start:.4g} {one.unit}: needs {one.remedy}" for one in left]
@@ -47,15 +48,24 @@ def _fitted(one: Parameter) -> tuple[str, str]:
 
 
 def write_vehicle(
-    start: Path, out: Path, parameters: Sequence[Parameter], config: Config, drives: Sequence[str]
+    start: Path,
+    out: Path,
+    parameters: Sequence[Parameter],
+    config: Config,
+    drives: Sequence[str],
+    checked: str,
 ) -> list[Parameter]:
     """Write CAR and return the parameters as written: one out of its key's range is left at START's value.
+
+    `checked`: the line of the cross-check, for the head.
 
     Raises:
         UserError: the file cannot be written, or no CONFIG results.
     """
     for _ in range(2):
-        write_car(start, out, head_of(parameters, start.name, drives), sections_of(parameters, config))
+        write_car(
+            start, out, head_of(parameters, start.name, drives, checked), sections_of(parameters, config)
+        )
         wrong = validate_config(out)
         if isinstance(wrong, Config):
             return list(parameters)

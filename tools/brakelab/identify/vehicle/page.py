@@ -143,9 +143,14 @@ def panels_of(found: Identified, params: Any) -> list[Panel]:
 
 
 def write_page(
-    page: Path, found: Identified, parameters: Sequence[Parameter], params: Any, drives: Sequence[str]
+    page: Path,
+    found: Identified,
+    parameters: Sequence[Parameter],
+    params: Any,
+    drives: Sequence[str],
+    checked: str,
 ) -> None:
-    """Write the page and its picture beside it."""
+    """Write the page, with the line of the cross-check, and its picture beside it."""
     picture = page.with_suffix(".svg")
     write_chart(picture, panels_of(found, params), [("front, or all", BLUE), ("rear", ORANGE), ("fit", PINK)])
     tables = [
@@ -156,4 +161,5 @@ def write_page(
     ]
     parts = [markdown(table) for table in tables if table.rows]
     head = f"# The car of {', '.join(drives)}\n\n![Fits]({picture.name})\n\n"
+    head += f"{checked}.\n\n" if checked else ""
     page.write_text(head + "\n".join(parts).rstrip() + "\n", encoding="utf-8")

@@ -56,6 +56,8 @@ class Identified(NamedTuple):
     signals: Signals
     prior: Prior
     """START's, of `Place`."""
+    known: Prior
+    """The same with what kinematics say."""
     fit: Fit
     residuals: Residuals
     windows: Windows
@@ -102,7 +104,7 @@ def identify(drives: Sequence[DriveSamples], start: RecordArray, closed: bool) -
     yaw = still or (pairs.yaw_zero if pairs else None)
     across = lateral_zero(windows, float(radius.mean()), yaw) if yaw else None
     sensors = Zeros(zero, across, yaw, _pressures(drives, zeros, windows))
-    return Identified(signals, prior, found, residuals, windows, pairs, dive, sensors, steps)
+    return Identified(signals, prior, known, found, residuals, windows, pairs, dive, sensors, steps)
 
 
 def _noise(drives: Sequence[DriveSamples], params: Any) -> tuple[float, float]:
