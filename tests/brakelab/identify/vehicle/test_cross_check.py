@@ -33,7 +33,7 @@ def brakings(scales: list[float]) -> Residuals:
         pytest.param([0.7] * 4, False, "fewer than 5 cannot tell", id="too few"),
         pytest.param([0.8, 1.2, 0.8, 1.2], False, "cannot tell", id="too few for START, which is better"),
         pytest.param([0.8], False, "1 brake application, ", id="one"),
-        pytest.param([], False, "", id="none"),
+        pytest.param([], True, "no steady brake application", id="none"),
     ],
 )
 def test_whose_brakes_are_better(scales: list[float], worse: bool, said: str) -> None:
@@ -42,10 +42,20 @@ def test_whose_brakes_are_better(scales: list[float], worse: bool, said: str) ->
     assert check.applications == len(scales)
     assert check.worse == worse
     assert said in check.line
-    assert bool(check.line) == bool(scales)
     kept = keep_start([FRICTION, MASS], check)
     assert kept[1] == MASS
     assert (kept[0].value == FRICTION.start, bool(kept[0].remedy)) == (worse, worse)
+
+
+def test_a_single_application_and_nothing_else_leaves_start() -> None:
+    residuals = Residuals(
+        lambda theta, half: theta[0] - np.full(WINDOWS, 0.8),
+        np.full(WINDOWS, BRAKING),
+        np.zeros(WINDOWS, int),
+        np.full(WINDOWS, 0.05),
+    )
+    check = cross_check(residuals, PRIOR, np.array([0.8]))
+    assert check.fitted == check.start == pytest.approx(0.2)
 
 
 def test_errors_are_of_applications_that_were_not_fitted_to() -> None:

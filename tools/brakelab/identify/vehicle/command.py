@@ -50,8 +50,7 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
         else:
             value = f"{one.value:.5g} ± {one.sigma:.2g}{unit}{one.doubt}"
             print(f"{one.key} = {value} ({one.source}; was {one.start:.5g})")
-    if check.line:
-        print(check.line)
+    print(check.line)
     for name, zero in zeros.items():
         print(
             f"{name}: reads {zero:+.4g} at 0"

@@ -34,7 +34,7 @@ def sections_of(parameters: Sequence[Parameter], config: Config) -> dict[str, Se
 def head_of(parameters: Sequence[Parameter], start: str, drives: Sequence[str], checked: str) -> str:
     """Return the first lines of CAR: where its keys are from, how they predict, which no drive identified."""
     lines = [f"# Identified by `brake-ecu identify vehicle` from {', '.join(drives)}; ± is 1 σ."]
-    lines += [f"# {checked}"] if checked else []
+    lines.append(f"# {checked}")
     if left := [one for one in parameters if one.remedy]:
         lines += [f"# Not identified, {start}'s value:"]
         lines += [f"# {one.key} = {one.start:.4g} {one.unit}: needs {one.remedy}" for one in left]

@@ -36,14 +36,16 @@ class CrossCheck(NamedTuple):
 
     @property
     def worse(self) -> bool:
-        """Return whether START's brakes are shown to be the better ones."""
+        """Return whether START's brakes are the better ones: without an application nothing shows others."""
+        if not self.applications:
+            return True
         return self.applications >= FEWEST_APPLICATIONS and self.start < self.fitted
 
     @property
     def line(self) -> str:
-        """Return what is to be said of the brakes, empty without an application."""
+        """Return what is to be said of the brakes."""
         if not self.applications:
-            return ""
+            return "no steady brake application on a straight road: START's brakes are kept"
         count = f"{self.applications} brake application" + "s" * (self.applications > 1)
         errors = (
             f"predicted from the others to {self.fitted:.2g} m/s^2, by START's brakes to {self.start:.2g}"
@@ -70,7 +72,7 @@ def cross_check(residuals: Residuals, prior: Prior, theta: Vector) -> CrossCheck
     for fold in range(min(FOLDS, len(applications))):
         own = applications[fold::FOLDS]
         left_out = np.isin(residuals.cluster, own)
-        found = fit(_without(residuals, left_out), prior, theta).theta
+        found = prior.mean if left_out.all() else fit(_without(residuals, left_out), prior, theta).theta
         for by, state in enumerate((found, prior.mean)):
             balance = 0.5 * (residuals.of(state, 0) + residuals.of(state, 1))
             errors[by, fold::FOLDS] = [balance[braked & (residuals.cluster == one)].mean() for one in own]

@@ -161,5 +161,5 @@ def write_page(
     ]
     parts = [markdown(table) for table in tables if table.rows]
     head = f"# The car of {', '.join(drives)}\n\n![Fits]({picture.name})\n\n"
-    head += f"{checked}.\n\n" if checked else ""
+    head += f"{checked}.\n\n"
     page.write_text(head + "\n".join(parts).rstrip() + "\n", encoding="utf-8")
