@@ -12,7 +12,8 @@ functions do (ECE R13-H, Annex 5: the rear uses no more grip than the front):
   `rear_slip_margin`, and by the car's speed `LEAST_SLIP` more than tyres do at the deceleration measured,
   torque of the rear axle moves to the front one until it no longer does. A front wheel counts as no faster
   than the ground: one whose speed is late or scaled alone takes nothing. One that the slip guard holds is no
-  measure: just cut, it slips less than it can. This needs no friction estimate.
+  measure: just cut, it slips less than it can. This needs no friction estimate. A wheel that slips as before
+  `DENIED_S` after its axle was relieved does not slip: what it reads less is taken for its radius.
   Beside a front wheel whose brake has failed it may slip `LONE_SLIP`. The front takes all of it up to `GRIP`
   of its load, beyond that slowly; none from when it slips more than `GRIP_SLIP`.
 - `cap_trailing`: compensation raises the rear's pressure relative to the front's only as far as the estimate
@@ -43,6 +44,8 @@ DISTRIBUTION_STATE = np.dtype(
         ("offset", "f8", (2,)),  # the same of a rear wheel while rolling freely: error of the radii
         ("free_s", "f8", (2,)),  # learning time of that, at most LEARNING_TIME
         ("slip", "f8", (2,)),  # of a trailing wheel by the car's speed, low-passed
+        ("slipped", "f8", (2,)),  # `beyond` of it before its axle was relieved
+        ("held_s", "f8", (2,)),  # time for which it has slipped as much since
     ],
     align=True,
 )
@@ -51,7 +54,10 @@ IDEAL, FIXED, ELECTRONIC = range(len(DISTRIBUTIONS))
 LEAST_TRAILING = 0.3  # share that the trailing axle always keeps
 KEPT = 0.95  # of it, below which the axle counts as held back
 TAKE_BACK = 600.0  # 1/s per slip: 1 % excess reduces the torque at 6 1/s
-GIVE_BACK = 0.3  # 1/s
+GIVE_BACK, GIVE_BACK_DENIED = 0.3, 2.0  # 1/s
+RELIEVED, DENIED_S = 0.7, 0.25  # share kept, s: a wheel that slips turns faster then, on ice too
+AS_BEFORE, DEEPEST = 0.8, 0.1  # of the slip; slip beyond which a wheel locks
+DENIES = 10.0  # 1/s
 SMOOTHING = 0.2  # per sample: 50 ms; leaves a fifth of the wheel speeds' noise
 LEARNING_TIME = 2.0  # s
 RADIUS_DOUBT = 0.008  # before learning: radii within 0.3 % and other differences, two standard deviations
@@ -134,7 +140,7 @@ def watch_trailing(
     """
     brakes = decel > 0.0
     free = not brakes and abs(estimate.accel_x) < FREE_ACCEL and abs(estimate.yaw_rate) < FREE_YAW_RATE
-    worst, trailing = 0.0, 1.0 if speed > 0.0 else -1.0
+    worst, trailing, denied = 0.0, 1.0 if speed > 0.0 else -1.0, False
     used = min(max(-trailing * estimate.accel_x, 0.0), max(decel, 0.0)) / GRAVITY
     for side in range(2):
         front = rear = math.nan
@@ -161,9 +167,23 @@ def watch_trailing(
             doubt += RADIUS_DOUBT
         leading = side if trailing > 0.0 else side + 2
         margin = LONE_SLIP if failed[leading] else params.rear_slip_margin
-        if not guarded[leading] and state.slip[side] > LEAST_SLIP + used / params.slip_stiffness[leading]:
-            worst = max(worst, state.beyond[side] - margin - doubt)
-    change = -TAKE_BACK * worst if worst > 0.0 else GIVE_BACK
+        excess = state.beyond[side] - margin - doubt
+        slips = state.slip[side] > LEAST_SLIP + used / params.slip_stiffness[leading] and excess > 0.0
+        if state.trailing > RELIEVED:
+            state.slipped[side] = state.beyond[side]
+        as_before = state.beyond[side] > AS_BEFORE * state.slipped[side] or state.held_s[side] > DENIED_S
+        if brakes and slips and as_before and state.trailing < RELIEVED and state.beyond[side] < DEEPEST:
+            state.held_s[side] += dt
+        elif slips or not brakes:
+            state.held_s[side] = 0.0
+        if state.held_s[side] > DENIED_S:
+            state.offset[side] += trailing * DENIES * dt * max(excess, 0.0)
+            denied = True
+        elif slips and not guarded[leading]:
+            worst = max(worst, excess)
+    change = -TAKE_BACK * worst
+    if worst == 0.0:
+        change = GIVE_BACK_DENIED if denied else GIVE_BACK
     state.trailing = min(max(state.trailing + change * dt, LEAST_TRAILING), 1.0) if brakes else 1.0
 
 
