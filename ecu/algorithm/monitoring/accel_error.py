@@ -19,27 +19,27 @@ first line alone is that of all wheel speeds: reported, but used, for slip and r
 what it makes of the reading is nothing then.
 """
 
+import math
+
 import numpy as np
 
 from ecu.algorithm.inputs import fresh
 from ecu.algorithm.monitoring.acceleration import BLOCK_S, ROLLED, A, F, W
+from ecu.algorithm.monitoring.error_line import (
+    LINE_STATE,
+    SCALE_MOST,
+    correct_line,
+    learn_offset,
+    learn_scale,
+    moved_offset,
+    moved_scale,
+    widen_line,
+)
 from ecu.algorithm.monitoring.witness import compare
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import ACCEL_X, MOTOR_TORQUE, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
-LINE_STATE = np.dtype(
-    [
-        ("offset", "f8"),  # m/s^2
-        ("scale", "f8"),
-        ("p", "f8", (3,)),  # variances of both, covariance
-        ("usual_offset", "f8"),  # mean while nothing has moved [m/s^2]
-        ("usual_scale", "f8"),
-        ("offset_s", "f8"),  # learning times of these [s]
-        ("scale_s", "f8"),
-    ],
-    align=True,
-)
 ACCEL_ERROR_STATE = np.dtype(
     [
         ("wheels", LINE_STATE),  # c, s
@@ -50,7 +50,10 @@ ACCEL_ERROR_STATE = np.dtype(
         ("doubted_s", "f8"),  # time for which both lines have moved to the same side, at most `REPORTED_S`
         ("reported", "u1"),  # that has lasted
         ("rolls_s", "f8"),  # time for which the scale of the wheels' line alone has moved, at most `ROLLS_S`
-        ("rolls_wrong", "u1"),  # that has lasted: all wheel speeds are scaled
+        ("rolls_wrong", "u1"),  # that has lasted: all wheel speeds may be scaled
+        ("rolls_shown", "u1"),  # it has, while the car speeds up this time
+        ("rolls_confirmed", "u1"),  # the vehicle speed shows it too
+        ("rolls_times", "i8"),  # how often in a row it has, while the car sped up
         ("stood_s", "f8"),
         ("zero_off", "f8"),  # taken off the reading [m/s^2]
         ("scale_off", "f8"),  # of it
@@ -60,7 +63,7 @@ ACCEL_ERROR_STATE = np.dtype(
     align=True,
 )
 
-OFFSET_START, SCALE_START, SCALE_MOST = 0.5, 0.03, 0.05  # m/s^2, -, -
+OFFSET_START, SCALE_START = 0.5, 0.03  # m/s^2, -
 LEAST_SHOWN = 2.0  # m/s^2, below which a scale does not show
 ACROSS = 2.0  # m/s^2, above which tyres drag by more than 0.03
 SLOPE_WALK, SCALE_WALK = 0.1, 0.01  # m/s^2 and - per root second
@@ -68,18 +71,19 @@ ZERO_WALK, TORQUE_WALK = 0.03, 0.003  # likewise, of b and k
 NOISE, TORQUE_NOISE = 0.15, 0.1  # m/s^2, of a block's difference
 SLIP, SLIP_BY_SPEED = 0.1, 0.01  # of a change of force, -, s/m
 STEADY = 1.0  # m/s^2 in 0.2 s, beyond which tyre forces still build up
-LARGEST_SCALE = 0.5
 GROSS = 1.5  # m/s^2
 SLOPE_S, SCALE_S, TORQUES_S = 10.0, 30.0, 60.0  # memory of c, s, b and k
 FEWEST_S, FEWEST_SCALE_S, FEWEST_REPORTED_S = 2.0, 3.0, 5.0
 APART_S = 0.5
+KNOWN_OFFSET = 0.06  # m/s^2, standard deviation: forces of one size do not tell a zero from a scale
 UNSEEN, UNSEEN_SHARE, WIND = 0.1, 0.03, 0.25  # m/s^2, of the force, of the drag: what torques may differ by
 MOVED, REPORTED_S = 0.14, 0.4  # m/s^2, sound cars stay below 0.07; s
-ROLLS, ROLLS_S = 0.05, 1.0  # of the speed, sound cars stay below 0.031; s
+ROLLS, ROLLS_S, ROLLS_TIMES = 0.05, 1.0, 3  # of the speed; s; -
+ROLLS_FREE = 1.0  # m/s^2
 UNMOVED = 0.4  # of that, what the torques show of it
 STANDS, STOOD_S = 0.1, 10.0  # m/s, s
 ZERO_DOUBT = 0.18  # m/s^2; sound cars stay below 0.1
-SCALE_DOUBT, LEAST_SCALE = 0.033, 0.02  # of the mean of both, of each; sound cars stay below 0.029
+SCALE_DOUBT = 0.033  # of the lesser of both; sound cars stay below 0.032
 PROVING, ENGINE, ENGINE_ZERO = 1.0, 0.2, 0.25  # m/s^2; of it, m/s^2: what an unreported engine exceeds
 PROVEN_S, SURE_S, REFUTES = 0.5, 3.0, 5.0  # s, s; times as fast as it is proven
 USUAL = 0.5  # of that, within which the torques are as usual
@@ -100,38 +104,6 @@ def _off(value: float, doubt: float, off: float) -> float:
 
 
 @kernel
-def _correct(line: Record, h: float, innovation: float, noise: float) -> None:
-    """Correct a line by a difference at `h` [m/s^2]."""
-    p = line.p
-    to_offset, to_scale = p[0] + h * p[2], p[2] + h * p[1]
-    variance = to_offset + h * to_scale + noise * noise
-    line.offset += to_offset / variance * innovation
-    line.scale = min(max(line.scale + to_scale / variance * innovation, -LARGEST_SCALE), LARGEST_SCALE)
-    p[0] -= to_offset * to_offset / variance
-    p[1] -= to_scale * to_scale / variance
-    p[2] -= to_offset * to_scale / variance
-
-
-@kernel
-def _walk(line: Record, offset: float, scale: float) -> None:
-    """Widen a line by a block's random walk."""
-    line.p[0] += offset * offset * BLOCK_S
-    line.p[1] = min(line.p[1] + scale * scale * BLOCK_S, SCALE_MOST**2)
-
-
-@kernel
-def _learn_offset(line: Record, memory_s: float) -> None:
-    line.offset_s = min(line.offset_s + BLOCK_S, memory_s)
-    line.usual_offset += (line.offset - line.usual_offset) * BLOCK_S / line.offset_s
-
-
-@kernel
-def _learn_scale(line: Record, memory_s: float) -> None:
-    line.scale_s = min(line.scale_s + BLOCK_S, memory_s)
-    line.usual_scale += (line.scale - line.usual_scale) * BLOCK_S / line.scale_s
-
-
-@kernel
 def accel_doubted(state: Record) -> bool:
     """Return whether zero or scale of the accelerometer are known to have drifted."""
     return state.reported != 0 or state.zero_off != 0.0 or state.scale_off != 0.0
@@ -148,31 +120,18 @@ def _wheels_accel(mean: Record) -> float:
 def _follow_wheels(state: Record, mean: Record) -> None:
     """Correct c and s by the last block."""
     line = state.wheels
-    _walk(line, SLOPE_WALK, SCALE_WALK)
+    widen_line(line, SLOPE_WALK, SCALE_WALK)
     change = abs(mean[0, F] - mean[2, F])
     h = _wheels_accel(mean)
     if abs(h) < LEAST_SHOWN:
         h = 0.0  # noise of the wheels would show as a scale
     elif not (accel_doubted(state) or state.rolls_wrong):
-        _learn_scale(line, SCALE_S)
+        learn_scale(line, SCALE_S)
     rolled = (mean[0, W] - mean[1, W]) / BLOCK_S
     innovation = 0.5 * (mean[0, A] + mean[1, A]) - rolled - line.offset - line.scale * h
     if change > STEADY or abs(innovation) > GROSS:
         return
-    _correct(line, h, innovation, NOISE + (SLIP + SLIP_BY_SPEED * mean[0, W]) * change / (2.0 * BLOCK_S))
-
-
-@kernel
-def moved_offset(line: Record) -> float:
-    """Return what the offset of a line has moved by [m/s^2]; of that by the wheels it is c less the slope."""
-    moved: float = line.offset - line.usual_offset
-    return moved
-
-
-@kernel
-def _moved_scale(line: Record) -> float:
-    moved: float = line.scale - line.usual_scale
-    return moved
+    correct_line(line, h, innovation, NOISE + (SLIP + SLIP_BY_SPEED * mean[0, W]) * change / (2.0 * BLOCK_S))
 
 
 @kernel
@@ -180,7 +139,7 @@ def wheels_confirm(state: Record, mean: Record, moved: float) -> bool:
     """Return whether the wheels show what the reading has moved by [m/s^2], at the present deceleration."""
     h, beside = _wheels_accel(mean), moved_offset(state.wheels)
     if abs(h) > LEAST_SHOWN:
-        beside += _moved_scale(state.wheels) * h
+        beside += moved_scale(state.wheels) * h
     confirm: bool = beside * moved > CONFIRMED * moved * moved
     return confirm
 
@@ -202,8 +161,12 @@ def usual_known(state: Record) -> bool:
 @kernel
 def _compare_scales(params: Record, state: Record, mean: Record, witness: Record) -> None:
     """Overwrite `rolls_wrong`: the wheels' line has moved by a scale, and the torques of motors deny it."""
-    moved, force = _moved_scale(state.wheels), mean[0, F]
-    if state.wheels.scale_s < FEWEST_SCALE_S or not usual_known(state) or force < LEAST_SHOWN:
+    moved, force = moved_scale(state.wheels), mean[0, F]
+    if state.wheels.scale_s < FEWEST_SCALE_S or not usual_known(state):
+        return
+    if force < 0.5 * LEAST_SHOWN:
+        state.rolls_shown = 0
+    if force < LEAST_SHOWN:
         return
     alone = abs(state.apart) < UNMOVED * abs(moved) * force
     if alone:
@@ -213,9 +176,32 @@ def _compare_scales(params: Record, state: Record, mean: Record, witness: Record
     stands = alone and abs(moved) > (KEPT if state.rolls_wrong else 1.0) * ROLLS
     state.rolls_s = min(max(state.rolls_s + (BLOCK_S if stands else -BLOCK_S), 0.0), ROLLS_S)
     if state.rolls_s > ROLLS_S - 0.5 * BLOCK_S:
-        state.rolls_wrong = 1
+        state.rolls_times += 1 - state.rolls_shown
+        state.rolls_wrong = state.rolls_shown = 1
     elif state.rolls_s == 0.0:
-        state.rolls_wrong = 0
+        state.rolls_wrong = state.rolls_times = 0
+
+
+@kernel
+def all_wheels_scaled(state: Record, over_ground: float, accel: float) -> bool:
+    """Return whether all wheel speeds are known to be scaled alike: the vehicle speed confirms it.
+
+    Without one, only what is found `ROLLS_TIMES` in a row is: a slope that begins as the car speeds up looks
+    like it.
+
+    Args:
+        state: `ACCEL_ERROR_STATE`, overwritten.
+        over_ground: what the vehicle speed reads above the wheels, of it, beside the usual; NaN: silent.
+        accel: of the car [m/s^2]; beyond `ROLLS_FREE` slip is in the difference.
+    """
+    if not state.rolls_wrong:
+        state.rolls_confirmed = 0
+        return False
+    moved = moved_scale(state.wheels)
+    if abs(accel) < ROLLS_FREE:
+        state.rolls_confirmed = 1 if over_ground * moved > CONFIRMED * moved * moved else 0
+    again: bool = state.rolls_times >= ROLLS_TIMES
+    return again if math.isnan(over_ground) else state.rolls_confirmed != 0
 
 
 @kernel
@@ -224,7 +210,7 @@ def _compare_lines(state: Record, mean: Record, witness: Record) -> None:
     torques = state.torques
     if not usual_known(state):
         return
-    moved = moved_offset(torques) + _moved_scale(torques) * mean[0, F]
+    moved = moved_offset(torques) + moved_scale(torques) * mean[0, F]
     agree = wheels_confirm(state, mean, moved) and state.rolls_wrong == 0
     if agree:
         compare(witness, ACCEL_X, moved, MOVED)
@@ -253,16 +239,19 @@ def _follow_torques(params: Record, state: Record, mean: Record, witness: Record
     innovation = left - line.offset - line.scale * force
     if abs(innovation) > GROSS or state.proven_s < PROVEN_S:
         return
-    _walk(line, ZERO_WALK, TORQUE_WALK)
-    _correct(line, force, innovation, TORQUE_NOISE)
+    widen_line(line, ZERO_WALK, TORQUE_WALK)
+    correct_line(line, force, innovation, TORQUE_NOISE)
     _compare_scales(params, state, mean, witness)
     _compare_lines(state, mean, witness)
     usual = abs(state.apart) < USUAL * torques_tolerance(params, mean)
-    if usual and state.zero_off == 0.0 and state.reported == 0:
-        _learn_offset(line, TORQUES_S)
-        _learn_scale(line, TORQUES_S)
+    if line.p[0] > KNOWN_OFFSET**2:
+        if line.offset_s == 0.0:
+            line.usual_offset, line.usual_scale = line.offset, line.scale
+    elif usual and state.zero_off == 0.0 and state.reported == 0:
+        learn_offset(line, TORQUES_S)
+        learn_scale(line, TORQUES_S)
         if abs(moved_offset(line)) < 0.5 * ZERO_DOUBT:
-            _learn_offset(state.wheels, SLOPE_S)
+            learn_offset(state.wheels, SLOPE_S)
     zero = moved_offset(line)
     confirmed = line.offset_s > FEWEST_S and moved_offset(state.wheels) * zero > CONFIRMED * zero * zero
     confirmed = confirmed and state.rolls_wrong == 0
@@ -303,9 +292,9 @@ def follow_accel_error(
         _follow_torques(params, state, blocks.mean, witness)
     else:
         state.apart = 0.0
-    by_wheels, by_torques = _moved_scale(wheels), _moved_scale(torques)
-    shown = 0.5 * (by_wheels + by_torques)
-    if by_wheels * by_torques <= 0.0 or min(abs(by_wheels), abs(by_torques)) < LEAST_SCALE:
+    by_wheels, by_torques = moved_scale(wheels), moved_scale(torques)
+    shown = by_wheels if abs(by_wheels) < abs(by_torques) else by_torques
+    if by_wheels * by_torques <= 0.0:
         shown = 0.0
     if wheels.scale_s > FEWEST_SCALE_S and torques.scale_s > FEWEST_S:
         compare(witness, ACCEL_X, shown * LEAST_SHOWN, SCALE_DOUBT * LEAST_SHOWN)

@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from ecu.algorithm.vehicle import tyre_slip
 from ecu.jit import Record, kernel
 
 WHEELS, OVER_GROUND = 0, 1
@@ -61,9 +62,44 @@ def follow_carried(state: Record, k: int, speed: float, accel: float, dt: float)
 
 
 @kernel
+def carry_speeds(
+    params: Record, state: Record, implied: Record, accel: float, known: bool, dt: float
+) -> None:
+    """Let the accelerometer carry the wheels' speed and the vehicle speed on, where it is `known`.
+
+    Args:
+        params: `PARAMS`.
+        state: `CARRIED_STATE`, overwritten.
+        implied: car's speed by the four wheels and the vehicle speed [m/s]; NaN: silent.
+        accel: of the car [m/s^2].
+        known: it is.
+        dt: time since the last cycle [s].
+    """
+    total, wheels = 0.0, 0
+    for i in range(4):
+        if math.isfinite(implied[i]):
+            total, wheels = total + implied[i], wheels + 1
+    rolled = total / wheels * (1.0 + tyre_slip(params, accel)) if known and wheels > 2 else math.nan
+    over_ground = implied[4] if known else math.nan
+    follow_carried(state, WHEELS, rolled, accel, dt)
+    follow_carried(state, OVER_GROUND, over_ground, accel, dt)
+
+
+@kernel
+def _confirmed(state: Record, k: int, other: int) -> bool:
+    mine, its = abs(state.behind[k]), abs(state.behind[other])
+    known = state.age_s[k] > KNOWN_S and its > LEAST_BEHIND
+    confirmed: bool = known and mine < CONFIRMED * its
+    return confirmed
+
+
+@kernel
 def over_ground_confirmed(state: Record) -> bool:
     """Return whether the accelerometer confirms the vehicle speed, and not the wheels."""
-    wheels, over_ground = abs(state.behind[WHEELS]), abs(state.behind[OVER_GROUND])
-    known = state.age_s[OVER_GROUND] > KNOWN_S and wheels > LEAST_BEHIND
-    confirmed: bool = known and over_ground < CONFIRMED * wheels
-    return confirmed
+    return _confirmed(state, OVER_GROUND, WHEELS)
+
+
+@kernel
+def wheels_confirmed(state: Record) -> bool:
+    """Return whether the accelerometer confirms the wheels, and not the vehicle speed."""
+    return _confirmed(state, WHEELS, OVER_GROUND)

@@ -9,6 +9,8 @@ vehicle speed, and the slip of the configured tyre at this deceleration is allow
 together make nobody late. Once a wheel slips by `SLIDES` more than that, or the slip guard acts, nothing is
 said until the next braking: what comes back from there looks late.
 
+A vehicle speed may be late, as one by satellites is: it is not judged by that, its samples are older by L.
+
 Assumption: all constants. On straight, split and sloping roads and in bends L of sound inputs stays below
 0.04 s.
 """
@@ -41,6 +43,8 @@ WALK = 0.004  # s per root second
 NOISE = 0.25  # m/s of a cycle's reading
 SLIDES, LONGEST = 0.04, 0.35  # of the speed, s: what is beyond that is no lag
 LATE, LATE_DOUBT, SIGMAS = 0.05, 0.03, 2.0  # s, s, -
+DOUBTED = 3.5  # standard deviations: of one that has not braked yet, `LONGEST`
+KNOWN = 0.1  # s of doubt, within which the vehicle speed says that wheels are late
 REFERENCE = 4.0  # m/s^2, the deceleration at which an innovation is published
 DOUBT_S = 0.3
 
@@ -98,6 +102,26 @@ def follow_lag(state: Record, i: int, above: float, accel: float, ground: float,
 
 
 @kernel
+def _least_lag(state: Record, i: int) -> float:
+    """Return the lag beyond which input `i` is late [s]."""
+    return max(LATE, LATE_DOUBT + SIGMAS * math.sqrt(state.p[i, 0]))
+
+
+@kernel
+def reference_lag(state: Record) -> float:
+    """Return how late the vehicle speed is found to be [s]; 0: it is not."""
+    lag: float = state.lag[WHEELS]
+    return lag if lag > _least_lag(state, WHEELS) else 0.0
+
+
+@kernel
+def doubted_lag(state: Record) -> float:
+    """Return by how much later the vehicle speed may be than is found [s]."""
+    doubted: float = DOUBTED * math.sqrt(state.p[WHEELS, 0])
+    return doubted
+
+
+@kernel
 def judge_lag(state: Record, witness: Record, i: int, place: int, unit: float, dt: float) -> bool:
     """Judge input `i` if it is late; return whether it is.
 
@@ -109,7 +133,7 @@ def judge_lag(state: Record, witness: Record, i: int, place: int, unit: float, d
         unit: of the input per m/s.
         dt: time since the last cycle [s].
     """
-    least = max(LATE, LATE_DOUBT + SIGMAS * math.sqrt(state.p[i, 0]))
+    least = _least_lag(state, i)
     late: bool = state.lag[i] > least
     if late:
         judge(witness, place, state.lag[i] * REFERENCE * unit, least * REFERENCE * unit, DOUBT_S, dt)

@@ -24,12 +24,12 @@ from ecu.algorithm.lag import lag_gain
 from ecu.algorithm.monitoring.accel_error import (
     USUAL,
     accel_doubted,
-    moved_offset,
     torques_tolerance,
     usual_known,
     wheels_confirm,
 )
 from ecu.algorithm.monitoring.acceleration import BLOCK_S, KNOWN_MOTORS
+from ecu.algorithm.monitoring.error_line import moved_offset
 from ecu.algorithm.monitoring.witness import AGAIN_S, FASTEST_DOUBT, compare, judge
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import ACCEL_X, MOTOR_TORQUE

@@ -4,11 +4,14 @@ Accelerometer, wheel speeds and calliper pressures are compared with each other 
 estimation, by the estimate of the last cycle.
 """
 
+import math
+
 from ecu.algorithm.hydraulics import learn_lateness
 from ecu.algorithm.inputs import LEAST_REQUEST, driver_accelerates, others_brake, requested_decel, usable
 from ecu.algorithm.monitoring.accel_error import (
     PROVEN_S,
     accel_doubted,
+    all_wheels_scaled,
     correct_accel,
     follow_accel_error,
     watch_frozen,
@@ -16,6 +19,7 @@ from ecu.algorithm.monitoring.accel_error import (
 from ecu.algorithm.monitoring.acceleration import watch_acceleration, wheels_deny
 from ecu.algorithm.monitoring.carried import OVER_GROUND
 from ecu.algorithm.monitoring.failed_brakes import watch_brakes
+from ecu.algorithm.monitoring.lateness import reference_lag
 from ecu.algorithm.monitoring.motors import (
     LEAST_SPEED,
     LET_GO_S,
@@ -25,7 +29,7 @@ from ecu.algorithm.monitoring.motors import (
 )
 from ecu.algorithm.monitoring.plausibility import watch_pressures, watch_wheels, wheel_speed_implausible
 from ecu.algorithm.monitoring.pressures import DOUBT_S, compare_pressures, lasting_difference
-from ecu.algorithm.monitoring.speeds import watch_speeds
+from ecu.algorithm.monitoring.speeds import SPEED, watch_speeds
 from ecu.algorithm.monitoring.turning import watch_turning
 from ecu.algorithm.monitoring.wheel_unit import watch_wheel_unit
 from ecu.algorithm.monitoring.witness import believe, leave_out, rejected_faults
@@ -58,7 +62,8 @@ def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
         follow_accel_error(p, s.accel_error, s.witness, s.acceleration, estimate.accel_y, braking)
     if accel_doubted(s.accel_error):
         faults |= ACCEL_X_DRIFTED
-    if s.accel_error.rolls_wrong:
+    above = s.speeds.apart[SPEED] - s.speeds.base[SPEED] if usable(u, VEHICLE_SPEED) else math.nan
+    if all_wheels_scaled(s.accel_error, above, estimate.accel_x):
         faults |= ALL_WHEELS
     if s.accel_error.proven_s > PROVEN_S and not wheels_deny(s.acceleration):
         watch_motors(p, s.motors, s.witness, u, estimate, base, s.accel_error, s.acceleration, dt)
@@ -134,12 +139,13 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
 
 @kernel
 def mask_implausible(p: Record, s: Record, u: Record) -> None:
-    """Mask out the implausible of the inputs `u`, and correct the accelerometer's reading.
+    """Mask out the implausible of the inputs `u`; correct accelerometer's reading and vehicle speed's age.
 
     What contradicts torques is masked where this ECU brakes: those of a car that others brake prove nothing.
     """
     if p.transmit:
         _mask_contradicted(s, u)
+    u.age_ns[VEHICLE_SPEED] += int(1e9 * reference_lag(s.speeds.lateness))
     if abs(u.value[ACCEL_X]) > p.accel_range:
         _distrust(s, u, ACCEL_X)
     for i in range(4):

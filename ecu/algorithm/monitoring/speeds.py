@@ -17,7 +17,8 @@ The vehicle speed is judged where it is slower than the wheels and nothing drive
 while they roll freely, or while dead reckoning agrees with them. A constant error of less than
 `FARTHEST_BASE` is another radius.
 
-An input that is late by the braking of the car (`lateness.py`) is judged by that alone.
+A wheel speed that is late by the braking of the car (`lateness.py`) is judged by that alone; such a vehicle
+speed counts as older.
 
 Braked wheels that slip together leave the car. Dead reckoning does not follow a median that is more than
 `LEAVES` below it, but the vehicle speed where the two agree, and stands for the median. For `SPIN_UP_S` more
@@ -32,12 +33,20 @@ import numpy as np
 from ecu.algorithm.inputs import OVERSLEPT_S, driver_accelerates, motor_torque, usable
 from ecu.algorithm.monitoring.carried import (
     CARRIED_STATE,
-    OVER_GROUND,
     WHEELS,
-    follow_carried,
+    carry_speeds,
     over_ground_confirmed,
+    wheels_confirmed,
 )
-from ecu.algorithm.monitoring.lateness import LATENESS_STATE, begin_lateness, follow_lag, judge_lag
+from ecu.algorithm.monitoring.lateness import (
+    KNOWN,
+    LATENESS_STATE,
+    begin_lateness,
+    doubted_lag,
+    follow_lag,
+    judge_lag,
+    reference_lag,
+)
 from ecu.algorithm.monitoring.witness import judge
 from ecu.algorithm.vehicle import corner_speed, tyre_slip
 from ecu.contract.signals import ACCEL_X, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
@@ -80,6 +89,7 @@ DRAGGED_ACCEL = -0.7  # m/s^2, an engine that holds wheels on ice
 TORQUE = 60.0  # N m, above which a wheel is braked or driven
 RECKON, SLOPE_RECKON = 0.8, 0.16  # 1/s, 1/s^2: critically damped at 0.4 rad/s
 RECKON_REACH = 0.04  # of the speed, greatest innovation
+AWAY = 0.02  # of the speed, dead reckoning above wheels beyond which they do not tell a lag
 LEAVES = 0.5 * SLID  # of the speed: reckoning and wheels that slip by `SLID` have this median
 SPINS, SPINS_BY = 0.15, 2.0  # of the speed, m/s: more than a grade that begins moves the reckoning by
 
@@ -96,7 +106,7 @@ def _gather(params: Record, state: Record, inputs: Record, estimate: Record) -> 
         turning = corner_speed(params, estimate, estimate.speed, i) - estimate.speed
         rolled = abs(inputs.value[WHEEL_SPEED + i]) * params.wheel_radius[i]
         state.implied[i] = (rolled - turning) * (1.0 - state.base[i])
-    delay = params.vehicle_speed_delay + 1e-9 * inputs.age_ns[VEHICLE_SPEED]
+    delay = params.vehicle_speed_delay + 1e-9 * inputs.age_ns[VEHICLE_SPEED] + reference_lag(state.lateness)
     over_ground = inputs.value[VEHICLE_SPEED] + delay * estimate.accel_x
     state.implied[SPEED] = over_ground * (1.0 - state.base[SPEED])
     invalid = params.mapped[VEHICLE_SPEED_VALID] != 0 and inputs.value[VEHICLE_SPEED_VALID] < 0.5
@@ -121,19 +131,6 @@ def _median(state: Record, witness: Record) -> float:
             count += 1
     middle: float = 0.5 * (state.sorted[(count - 1) // 2] + state.sorted[count // 2])
     return middle if count > 2 else math.nan
-
-
-@kernel
-def _carry(params: Record, state: Record, accel: float, known: bool, dt: float) -> None:
-    """Let the accelerometer carry the wheels' speed and the vehicle speed on, where it is `known`."""
-    total, wheels = 0.0, 0
-    for i in range(4):
-        if math.isfinite(state.implied[i]):
-            total, wheels = total + state.implied[i], wheels + 1
-    rolled = total / wheels * (1.0 + tyre_slip(params, accel)) if known and wheels > 2 else math.nan
-    over_ground = state.implied[SPEED] if known else math.nan
-    follow_carried(state.carried, WHEELS, rolled, accel, dt)
-    follow_carried(state.carried, OVER_GROUND, over_ground, accel, dt)
 
 
 @kernel
@@ -196,23 +193,27 @@ def _reckon(
 
 
 @kernel
-def _judged(state: Record, i: int, ground: float, free: bool, braked: bool, driven: bool) -> float:
+def _judged(
+    state: Record, i: int, ground: float, free: bool, braked: bool, driven: bool, drives: bool
+) -> float:
     """Return by how much input `i` contradicts the others, over the speed; NaN: nothing is said of it.
 
     Where wheels slip together the median, `ground`, slips with them: dead reckoning and vehicle speed count.
+    Without a vehicle speed an axle that is slower while the car is driven (`drives`) may be one that is not.
     """
     apart: float = state.apart[i] - state.base[i]
     if free:
         return apart
     if i < SPEED:
         reckoned, speed = state.reckoned / ground, state.implied[SPEED] / ground
+        rolls = False
         if not math.isfinite(speed):
-            speed = 1.0
+            speed, rolls = 1.0, drives and state.apart[i ^ 1] - state.base[i ^ 1] < 0.5 * apart
         faster = apart + 1.0 - max(reckoned, speed, 1.0)
         slower = apart + 1.0 - min(reckoned, speed, 1.0)
         if faster > 0.0 and not driven:
             return faster
-        return slower if slower < 0.0 and not braked else math.nan
+        return slower if slower < 0.0 and not braked and not rolls else math.nan
     if apart < 0.0:
         return math.nan if driven else apart
     away = abs(state.implied[SPEED] - state.reckoned)
@@ -241,15 +242,15 @@ def _believed(state: Record, witness: Record) -> int:
 
 
 @kernel
-def _above(state: Record, witness: Record, i: int, ground: float, slip: float) -> float:
-    """Return what a wheel reads above vehicle speed and median, or the former above the wheels [m/s].
+def _above(state: Record, witness: Record, i: int, fastest: float, slip: float) -> float:
+    """Return what a wheel reads above vehicle speed and `fastest`, or the former above the wheels [m/s].
 
     `slip` [m/s] of the wheels is allowed for.
     """
-    implied, fastest = state.implied[i], max(ground + slip, state.reckoned)
+    implied = state.implied[i]
     if i < SPEED:
-        speed = state.implied[SPEED]
-        if math.isfinite(speed) and not witness.rejected[VEHICLE_SPEED]:
+        speed, known = state.implied[SPEED], doubted_lag(state.lateness) < KNOWN
+        if known and math.isfinite(speed) and not witness.rejected[VEHICLE_SPEED]:
             fastest = max(fastest, speed)
         return implied + slip - fastest
     for j in range(4):
@@ -286,7 +287,7 @@ def watch_speeds(
     for i in range(4):
         drives = drives or motor_torque(inputs, i) < -TORQUE
     seen = usable(inputs, ACCEL_X) and not estimate.backwards and dt < OVERSLEPT_S
-    _carry(params, state, accel, seen, dt)
+    carry_speeds(params, state.carried, state.implied, accel, seen, dt)
     if _over_ground_tells(state, witness, braked, drives):
         median = state.implied[SPEED]
     known = state.reckoned if state.started else estimate.speed
@@ -298,6 +299,8 @@ def watch_speeds(
         state.started = 0
         for i in range(5):
             state.apart[i] = state.base[i]
+        if seen and wheels_confirmed(state.carried):
+            judge(witness, VEHICLE_SPEED, state.implied[SPEED] - median, SPINS_BY, DOUBT_S, dt)
         return
     _reckon(state, witness, inputs, accel, median, left, dt)
     if begins and drives:
@@ -315,28 +318,32 @@ def watch_speeds(
         tolerance = ROLLING + ROLLING_ACROSS * abs(estimate.accel_y)
         tolerance += (ABSOLUTE + LAG_S * abs(accel)) / ground
     lateness = state.lateness
-    believed, slides = _believed(state, witness), guarded or state.left_s > 0.0
-    shows = begin_lateness(lateness, believed, accel, estimate.accel_y, slides, dt)
-    slip = tyre_slip(params, accel) * ground
+    slip, delay = tyre_slip(params, accel) * ground, reference_lag(lateness)
+    reckoned = 0.0 if state.implied[SPEED] < 0.5 * (ground + state.reckoned) else state.reckoned
+    slides = guarded or state.left_s > 0.0 or reckoned > (1.0 + AWAY) * ground + slip
+    shows = begin_lateness(lateness, _believed(state, witness), accel, estimate.accel_y, slides, dt)
     for i in range(5):
         if math.isnan(state.implied[i]):
             continue
         if shows:
-            follow_lag(lateness, i, _above(state, witness, i, ground, slip), accel, ground, dt)
+            above = _above(state, witness, i, max(ground + slip, reckoned), slip)
+            above -= accel * delay if i == SPEED else 0.0
+            follow_lag(lateness, i, above, accel, ground, dt)
         implied = state.implied[i] / (1.0 - state.base[i])
         state.apart[i] += (implied / ground - 1.0 - state.apart[i]) * min(dt / SMOOTHING_S, 1.0)
         braking, motor = state.torque[i % 4], motor_torque(inputs, i % 4)
         braked, driven = False, accelerates or motor < -TORQUE
         if i < SPEED:
             braked = braking + motor > TORQUE or accel < DRAGGED_ACCEL or state.left_s > 0.0
-        apart = _judged(state, i, ground, free, braked, driven)
+        apart = _judged(state, i, ground, free, braked, driven, drives)
         confirmed = i == SPEED and over_ground_confirmed(state.carried)
         if confirmed or (i < SPEED and _slides(state, i, apart, braked, driven, dt)):
             apart = math.nan
         place = _place(i)
         unit = ground / params.wheel_radius[i] if i < SPEED else ground
-        if not judge_lag(lateness, witness, i, place, unit / ground, dt):
-            judge(witness, place, apart * unit, tolerance * unit, DOUBT_S, dt)
+        if i == SPEED or not judge_lag(lateness, witness, i, place, unit / ground, dt):
+            lag = doubted_lag(lateness) * abs(accel) / ground if i == SPEED else 0.0
+            judge(witness, place, apart * unit, (tolerance + lag) * unit, DOUBT_S, dt)
         if free and not witness.rejected[place] and abs(apart) < tolerance:
             base = state.base[i] + (state.apart[i] - state.base[i]) * dt / max(state.rolled_s, dt)
             state.base[i] = min(max(base, -FARTHEST_BASE), FARTHEST_BASE)

@@ -1,0 +1,70 @@
+"""Line between two decelerations, y = c + s h, by a Kalman filter of two states, and its means.
+
+`accel_error.py` has two: by what they have moved from their means, an error that comes shows.
+"""
+
+import numpy as np
+
+from ecu.algorithm.monitoring.acceleration import BLOCK_S
+from ecu.jit import Record, kernel
+
+LINE_STATE = np.dtype(
+    [
+        ("offset", "f8"),  # m/s^2
+        ("scale", "f8"),
+        ("p", "f8", (3,)),  # variances of both, covariance
+        ("usual_offset", "f8"),  # mean while nothing has moved [m/s^2]
+        ("usual_scale", "f8"),
+        ("offset_s", "f8"),  # learning times of these [s]
+        ("scale_s", "f8"),
+    ],
+    align=True,
+)
+
+SCALE_MOST = 0.05  # standard deviation
+LARGEST_SCALE = 0.5
+
+
+@kernel
+def correct_line(line: Record, h: float, innovation: float, noise: float) -> None:
+    """Correct a line by a difference at `h` [m/s^2]."""
+    p = line.p
+    to_offset, to_scale = p[0] + h * p[2], p[2] + h * p[1]
+    variance = to_offset + h * to_scale + noise * noise
+    line.offset += to_offset / variance * innovation
+    line.scale = min(max(line.scale + to_scale / variance * innovation, -LARGEST_SCALE), LARGEST_SCALE)
+    p[0] -= to_offset * to_offset / variance
+    p[1] -= to_scale * to_scale / variance
+    p[2] -= to_offset * to_scale / variance
+
+
+@kernel
+def widen_line(line: Record, offset: float, scale: float) -> None:
+    """Widen a line by a block's random walk."""
+    line.p[0] += offset * offset * BLOCK_S
+    line.p[1] = min(line.p[1] + scale * scale * BLOCK_S, SCALE_MOST**2)
+
+
+@kernel
+def learn_offset(line: Record, memory_s: float) -> None:
+    line.offset_s = min(line.offset_s + BLOCK_S, memory_s)
+    line.usual_offset += (line.offset - line.usual_offset) * BLOCK_S / line.offset_s
+
+
+@kernel
+def learn_scale(line: Record, memory_s: float) -> None:
+    line.scale_s = min(line.scale_s + BLOCK_S, memory_s)
+    line.usual_scale += (line.scale - line.usual_scale) * BLOCK_S / line.scale_s
+
+
+@kernel
+def moved_offset(line: Record) -> float:
+    """Return what the offset of a line has moved by [m/s^2]; of that by the wheels it is c less the slope."""
+    moved: float = line.offset - line.usual_offset
+    return moved
+
+
+@kernel
+def moved_scale(line: Record) -> float:
+    moved: float = line.scale - line.usual_scale
+    return moved
