@@ -150,6 +150,19 @@ def test_without_a_yaw_rate_the_track_is_not_identified(car, tmp_path):
     assert keys["front.vertical_stiffness"].remedy
 
 
+def test_what_is_far_from_start_is_not_identified(car, tmp_path):
+    """A third of the mass, half the track: motors and curves show others, START is of another car."""
+    config = load_config(SUV)
+    vehicle = config.vehicle.model_copy(update={"mass": config.vehicle.mass / 3.0, "track": 0.8})
+    start = config.model_copy(update={"vehicle": vehicle})
+    params = new_params(start)
+    found = identify(read_drives([car[1]], params, None), params, True)
+    keys = {one.key: one for one in parameters_of(found, start)}
+    for key in ("vehicle.mass", "vehicle.track"):
+        assert "a better START, which" in keys[key].remedy, key
+        assert keys[key].value == keys[key].start, key
+
+
 @pytest.mark.parametrize(
     ("without", "rows", "line"),
     [

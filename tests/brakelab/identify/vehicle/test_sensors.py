@@ -48,6 +48,13 @@ def test_a_closed_drive_tells_the_zero_of_the_accelerometer():
     assert sigma < 0.005
 
 
+def test_wheels_that_turn_backwards_tell_no_less():
+    windows, steps = windows_of()
+    backwards = np.where(np.arange(steps.speed.size) % 50 == 0, -0.02, steps.speed)
+    value, sigma = accel_zero(windows, steps._replace(speed=backwards), PITCH, closed=True)
+    assert value == pytest.approx(ZERO, abs=3 * sigma)
+
+
 def slalom_on_hills(begin: float):
     """Return windows and steps of a drive with curves from 100 to 150 s, on closed hills of 2400 m."""
     speed = 20.0 + 4.0 * np.sin(2 * np.pi * T / 50.0)

@@ -4,7 +4,8 @@ Forces alone show products, so a key carries what START's other keys leave: `mu_
 (with START's pistons and radius), `slip_stiffness` that of the axle at its load, `vertical_stiffness` the
 deflection under load transfer (with START's height of the centre of gravity), `unloaded_radius` the rolling
 radius at rest, `drag_coefficient` the drag area over START's frontal area. A key whose standard deviation
-the drive does not halve is not identified.
+the drive does not halve is not identified; nor is one that is `FARTHEST` of START's standard deviations from
+it: what the fit could not explain is in it then.
 """
 
 from collections.abc import Callable
@@ -22,6 +23,7 @@ from ecu.settings.config import AIR_DENSITY, Config
 HALVED: Final = 0.5  # of the prior's standard deviation: a key is identified
 ROUGH: Final = 0.05  # relative standard deviation from which a value is called rough
 START_OFF: Final = 0.25  # relative, of START's lengths
+FARTHEST: Final = 3.0  # of START's standard deviations
 
 
 PLACES: Final = {
@@ -97,7 +99,10 @@ def parameters_of(found: Identified, config: Config) -> list[Parameter]:
     rows = [_parameter(found, config, kind, found.fit.theta) for kind in kinds]
     left = [PLACES[one.key] for one in rows if one.remedy and one.key in PLACES]
     beside = _given(found, [place for place in left if found.prior.sigma[place] > 0.0])
-    rows = [_parameter(found, config, kind, beside) for kind in kinds]
+    rows = [
+        one if one.remedy else _parameter(found, config, kind, beside)
+        for one, kind in zip(rows, kinds, strict=True)
+    ]
     if found.pairs:
         track, sigma = found.pairs.track
         rows.append(_of_track(config, track, sigma, found.pairs.windows))
@@ -123,11 +128,13 @@ def _given(found: Identified, left: list[Place]) -> Vector:
 
 
 def _of_track(config: Config, track: float, sigma: float, count: int) -> Parameter:
-    known = sigma < 0.5 * START_OFF * config.vehicle.track
+    start, remedy = config.vehicle.track, "a slalom at 30 to 50 km/h, or a tape measure"
+    known = sigma < 0.5 * START_OFF * start
+    if known and abs(track - start) > FARTHEST * START_OFF * start:
+        known, remedy = False, _too_far(track, remedy)
     return Parameter(
-        "vehicle.track", "m", config.vehicle.track, track if known else config.vehicle.track, sigma, count,
-        "left against right wheels in curves",
-        "" if known else "a slalom at 30 to 50 km/h, or a tape measure",
+        "vehicle.track", "m", start, track if known else start, sigma, count,
+        "left against right wheels in curves", "" if known else remedy,
     )  # fmt: skip
 
 
@@ -229,8 +236,15 @@ def _parameter(found: Identified, config: Config, kind: _Kind, beside: Vector) -
         windows = found.dive[2] if found.dive else 0
     if name == "vertical_stiffness":
         windows = found.pairs.windows if found.pairs else 0
-    identified = windows > 0 and 0.0 < sigma < HALVED * before
+    identified, remedy = windows > 0 and 0.0 < sigma < HALVED * before, kind.remedy
     value = kind.of(beside) if identified else start
+    start_sigma = float(np.sqrt(_slope(kind.of, prior.mean, prior.sigma) ** 2 @ prior.sigma**2))
+    if identified and abs(value - kind.of(prior.mean)) > FARTHEST * start_sigma:
+        identified, value, remedy = False, start, _too_far(value, remedy)
     return Parameter(
-        kind.key, kind.unit, start, value, sigma, windows, kind.source, "" if identified else kind.remedy
+        kind.key, kind.unit, start, value, sigma, windows, kind.source, "" if identified else remedy
     )
+
+
+def _too_far(value: float, remedy: str) -> str:
+    return f"a better START, which {value:.4g} is too far from, or {remedy}"

@@ -117,7 +117,7 @@ def accel_zero(windows: Windows, steps: Steps, pitch_gradient: float, closed: bo
     """Return the zero of accel_x [m/s^2]; `closed`: each drive ends at the height where it began."""
     kappa = 1.0 + GRAVITY * pitch_gradient
     rest = (steps.felt / kappa - steps.change).mean(axis=0)
-    weight = steps.seconds * steps.speed
+    weight = np.maximum(steps.seconds * steps.speed, 0.0)
     turn = steps.yaw_rate**2
     columns = np.stack([np.ones_like(turn), turn, turn * steps.speed**2], axis=1)
     root = np.sqrt(weight)[:, None]
