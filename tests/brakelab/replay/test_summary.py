@@ -109,7 +109,7 @@ NONE = "prediction: no braking to judge it by"
         pytest.param(
             [(4.0, 4.2, 4.4, "")],
             [
-                "prediction of 1 brakings: off by 5.0 % on the mean, 5.0 % in the median, 5.0 % at worst, "
+                "prediction of 1 braking: off by 5.0 % on the mean, 5.0 % in the median, 5.0 % at worst, "
                 "bias +5.0 %",
                 "beside it, on the mean: configured friction 10.0 %, running average 10.0 %, "
                 "one scale in hindsight 0.0 %",

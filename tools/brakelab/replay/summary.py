@@ -78,7 +78,8 @@ def prediction_lines(rows: Sequence[BrakeRow]) -> list[str]:
     if counted:
         found = errors(measured, [row.specific_force_predicted for row in counted])
         lines = [
-            f"prediction of {found.counted} brakings: off by {100 * found.mean:.1f} % on the mean, "
+            f"prediction of {found.counted} braking{'s' if found.counted > 1 else ''}: "
+            f"off by {100 * found.mean:.1f} % on the mean, "
             f"{100 * found.median:.1f} % in the median, {100 * found.worst:.1f} % at worst, "
             f"bias {100 * found.bias:+.1f} %",
             "beside it, on the mean: " + ", ".join(

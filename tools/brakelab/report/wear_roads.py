@@ -9,7 +9,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
 
 from brakelab.arrays import Vector
 from brakelab.report.accuracy import AXLES
@@ -46,6 +45,8 @@ def distance(drive: DriveResult) -> Vector:
 
 def kinds(drive: DriveResult) -> NDArray[np.int64]:
     """Return the place in `KINDS` of each row, shape (n,)."""
+    from scipy.ndimage import maximum_filter1d
+
     speed = 3.6 * np.nan_to_num(np.abs(drive.column("vehicle_speed")))
     period = float(np.median(np.diff(drive.t)))
     highest = maximum_filter1d(speed, 2 * int(AROUND / period) + 1, mode="nearest")
