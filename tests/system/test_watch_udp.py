@@ -101,7 +101,9 @@ def test_the_page_in_a_browser(daemon, car, watch, tmp_path):
         browser.look(1200, 900)
         browser.open(address)
         wait_for(
-            lambda: car.drive(20).size > 0 and browser.evaluate("Number(document.body.dataset.rows)") > 30
+            lambda: (
+                car.drive(20).size > 0 and browser.evaluate("Number(document.body.dataset.rows ?? 0)") > 30
+            )
         )
         before, t = browser.evaluate("[rows.length, rows[rows.length - 1][0]]")
         car.drive(200)

@@ -172,7 +172,8 @@ def watch_trailing(
         if state.trailing > RELIEVED:
             state.slipped[side] = state.beyond[side]
         as_before = state.beyond[side] > AS_BEFORE * state.slipped[side] or state.held_s[side] > DENIED_S
-        if brakes and slips and as_before and state.trailing < RELIEVED and state.beyond[side] < DEEPEST:
+        as_before = as_before and state.beyond[side] < DEEPEST and not failed[leading]
+        if brakes and slips and as_before and state.trailing < RELIEVED:
             state.held_s[side] += dt
         elif slips or not brakes:
             state.held_s[side] = 0.0
