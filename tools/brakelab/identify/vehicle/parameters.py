@@ -4,8 +4,8 @@ Forces alone show products, so a key carries what START's other keys leave: `mu_
 (with START's pistons and radius), `slip_stiffness` that of the axle at its load, `vertical_stiffness` the
 deflection under load transfer (with START's height of the centre of gravity), `unloaded_radius` the rolling
 radius at rest, `drag_coefficient` the drag area over START's frontal area. A key whose standard deviation
-the drive does not halve is not identified; nor is one that is `FARTHEST` of START's standard deviations from
-it: what the fit could not explain is in it then.
+the drive does not halve is not identified; nor is one that is `FARTHEST_FROM_START` of START's standard
+deviations off: what the fit could not explain is in it then.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from ecu.settings.config import AIR_DENSITY, Config
 HALVED: Final = 0.5  # of the prior's standard deviation: a key is identified
 ROUGH: Final = 0.05  # relative standard deviation from which a value is called rough
 START_OFF: Final = 0.25  # relative, of START's lengths
-FARTHEST: Final = 3.0  # of START's standard deviations
+FARTHEST_FROM_START: Final = 3.0  # of START's standard deviations
 
 
 PLACES: Final = {
@@ -130,7 +130,7 @@ def _given(found: Identified, left: list[Place]) -> Vector:
 def _of_track(config: Config, track: float, sigma: float, count: int) -> Parameter:
     start, remedy = config.vehicle.track, "a slalom at 30 to 50 km/h, or a tape measure"
     known = sigma < 0.5 * START_OFF * start
-    if known and abs(track - start) > FARTHEST * START_OFF * start:
+    if known and abs(track - start) > FARTHEST_FROM_START * START_OFF * start:
         known, remedy = False, _too_far(track, remedy)
     return Parameter(
         "vehicle.track", "m", start, track if known else start, sigma, count,
@@ -239,7 +239,7 @@ def _parameter(found: Identified, config: Config, kind: _Kind, beside: Vector) -
     identified, remedy = windows > 0 and 0.0 < sigma < HALVED * before, kind.remedy
     value = kind.of(beside) if identified else start
     start_sigma = float(np.sqrt(_slope(kind.of, prior.mean, prior.sigma) ** 2 @ prior.sigma**2))
-    if identified and abs(value - kind.of(prior.mean)) > FARTHEST * start_sigma:
+    if identified and abs(value - kind.of(prior.mean)) > FARTHEST_FROM_START * start_sigma:
         identified, value, remedy = False, start, _too_far(value, remedy)
     return Parameter(
         kind.key, kind.unit, start, value, sigma, windows, kind.source, "" if identified else remedy
