@@ -134,6 +134,25 @@ def driven(car: Vehicle) -> Iterator[None]:
 
 
 @pytest.fixture
+def unit(
+    daemon: Callable[..., Daemon], car: Vehicle, request: pytest.FixtureRequest, tmp_path: Path
+) -> Iterator[Daemon]:
+    """An armed daemon with diagnostics and a key, beside a car that drives in a thread."""
+    from .uds_tester import SECRET
+
+    key = tmp_path / "key"
+    key.write_text(SECRET)
+    key.chmod(0o600)
+    group = request.module.GROUP
+    bus = ("--config", ROOT / "config" / "suv.toml", "--armed", "-i", "udp_multicast", "-c", group)
+    keeps = ("--state", tmp_path / "state", "--record", tmp_path / "record")
+    one = daemon(*bus, *keeps, "--diagnostics", "0x7E0:0x7E8", "--diagnostics-key", key)
+    one.wait_for("ready")
+    with driven(car):
+        yield one
+
+
+@pytest.fixture
 def start_driving(car: Vehicle) -> Iterator[Callable[[], None]]:
     """Let the car drive from the call on until the test ends."""
     with ExitStack() as stack:

@@ -32,7 +32,7 @@ from ecu.diagnostics.trouble_codes import TROUBLE_CODES
 
 from . import uds_tester
 from .conftest import ROOT, driven, process_of, unharmed
-from .uds_tester import SECRET, asked
+from .uds_tester import asked
 
 pytestmark = pytest.mark.multicast
 
@@ -43,25 +43,6 @@ WHEEL_SPEED = next(code.number for code in TROUBLE_CODES if code.fault.bit == WH
 def foreign_tester(addresses=(0x7E0, 0x7E8), **config):
     """A tester on the bus of this module."""
     return uds_tester.foreign_tester(addresses, interface="udp_multicast", channel=GROUP, **config)
-
-
-@pytest.fixture
-def key_file(tmp_path):
-    path = tmp_path / "key"
-    path.write_text(SECRET)
-    path.chmod(0o600)
-    return path
-
-
-@pytest.fixture
-def unit(daemon, car, key_file, tmp_path):
-    """An armed daemon with diagnostics beside a car that drives in a thread."""
-    bus = ("--config", ROOT / "config" / "suv.toml", "--armed", "-i", "udp_multicast", "-c", GROUP)
-    keeps = ("--state", tmp_path / "state", "--record", tmp_path / "record")
-    one = daemon(*bus, *keeps, "--diagnostics", "0x7E0:0x7E8", "--diagnostics-key", key_file)
-    one.wait_for("ready")
-    with driven(car):
-        yield one
 
 
 def server_of(unit):

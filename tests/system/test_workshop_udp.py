@@ -20,9 +20,9 @@ from ecu.recording.store import open_store, restore
 from ecu.settings.config import load_config, new_params, store_key
 
 from . import uds_tester
-from .conftest import ROOT, driven, unharmed
+from .conftest import ROOT, unharmed
 from .test_xcp_calibration import same_bits, stop
-from .uds_tester import SECRET, asked
+from .uds_tester import asked
 
 pytestmark = pytest.mark.multicast
 
@@ -39,20 +39,6 @@ WORKS = {
 def foreign_tester(**config):
     patience = {"p2_timeout": 10, "request_timeout": 20, **config}
     return uds_tester.foreign_tester(interface="udp_multicast", channel=GROUP, **patience)
-
-
-@pytest.fixture
-def unit(daemon, car, tmp_path):
-    """An armed daemon with diagnostics and a key, beside a car that drives in a thread."""
-    key = tmp_path / "key"
-    key.write_text(SECRET)
-    key.chmod(0o600)
-    bus = ("--config", ROOT / "config" / "suv.toml", "--armed", "-i", "udp_multicast", "-c", GROUP)
-    keeps = ("--state", tmp_path / "state", "--record", tmp_path / "record")
-    one = daemon(*bus, *keeps, "--diagnostics", "0x7E0:0x7E8", "--diagnostics-key", key)
-    one.wait_for("ready")
-    with driven(car):
-        yield one
 
 
 def unlocked(client):
