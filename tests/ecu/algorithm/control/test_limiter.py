@@ -58,9 +58,17 @@ def limit_both(params, state, left, wanted, uncompensated, torque, ceiling, dt):
     limit_axle(params[0], state[0], left, wanted, uncompensated, torque, dt)
 
 
+def limit(params, state, corner, wanted, uncompensated, torque, dt, ceiling=180 * BAR):
+    return limit_corner(params, state, corner, wanted, uncompensated, torque, ceiling, dt)
+
+
 @kernel
-def limit(params, state, corner, wanted, uncompensated, torque, dt, ceiling=180e5):
-    """One corner; nothing is asked of the other one, so there is nothing to level."""
+def limit_corner(params, state, corner, wanted, uncompensated, torque, ceiling, dt):
+    """One corner; nothing is asked of the other one, so there is nothing to level.
+
+    A default of a kernel would not be here: numba takes every omitted float for the first one that it met,
+    and resolves the types of a call anew, 2 ms, wherever it is another.
+    """
     four = np.zeros((3, 4))
     four[0, corner], four[1, corner], four[2, corner] = wanted, uncompensated, torque
     limit_both(params, state, corner // 2 * 2, four[0], four[1], four[2], ceiling, dt)

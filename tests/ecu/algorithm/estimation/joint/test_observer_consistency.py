@@ -123,7 +123,7 @@ def test_truth_is_inside_two_sigma(params, name: str, free) -> None:
             for h, sigma in zip(H[k // 20], noise, strict=True):
                 state["h"] = h
                 z = h @ truth + sigma * random.standard_normal()
-                correct(state, z - h @ state["x"], sigma**2, REJECT)
+                correct(state, z - h @ state["x"], sigma**2, REJECT, REJECT)
         error, P = truth - state["x"], state["p"]
         varies = [i for i in free if P[i, i] > 0.0]
         known = [i for i in range(N) if P[i, i] == 0.0]
@@ -159,7 +159,8 @@ def test_the_level_after_an_application_is_the_mean_of_its_friction(params) -> N
             truth = move(truth, random)
             for h, sigma in zip(H[k // 20], noise, strict=True):
                 state["h"] = h
-                correct(state, h @ (truth - state["x"]) + sigma * random.standard_normal(), sigma**2, REJECT)
+                innovation = h @ (truth - state["x"]) + sigma * random.standard_normal()
+                correct(state, innovation, sigma**2, REJECT, REJECT)
             trajectory.append(truth[LEVELS] + truth[np.repeat(CHANGES, 2)])
             note_change(state, 120.0)
         end_application(state)
