@@ -90,3 +90,19 @@ def report(
     from brakelab.identify.friction.report import report as report_of
 
     return report_of(data, other, columns, programme, out)
+
+
+@app.command()
+def export(
+    source: Annotated[Path, argument("FILE.toml", "Lining file of `identify friction`, or a CONFIG")],
+    out: Annotated[Path, option("LAW.c", "C source to write, or .csv: a table of friction")],
+    brake: Annotated[
+        str | None, option("BRAKE", "Lining of the file; default: its only one", autocompletion=brakes)
+    ] = None,
+    law: Annotated[str, option("LAW", "Friction law of the lining", autocompletion=laws)] = "SIM",
+    axle: Annotated[str, option("AXLE", "Of a CONFIG, whose wear and dust: front or rear")] = "front",
+) -> int:
+    """Write an identified law as C. Friction, or wear and dust of a CONFIG; friction also as a table."""
+    from brakelab.identify.export import export as write
+
+    return write(source, out, brake, law, axle)

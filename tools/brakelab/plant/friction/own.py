@@ -90,6 +90,12 @@ def read_code(code: str) -> Code:
     return _READ[code][1]
 
 
+def plain_step(code: str) -> Step:
+    """Return the function `step` of a file or entry point. Raises `ValueError`."""
+    step: Step = _module(code).step
+    return step
+
+
 def _module(code: str) -> ModuleType:
     if not code.endswith(".py"):
         found = list(importlib.metadata.entry_points(group=GROUP, name=code))
