@@ -35,6 +35,13 @@ EXPORTS = {
     "Excel, German": MANIFEST.replace(",", ";").replace(".123", ",123").encode("cp1252"),
     "Excel, Unicode text": MANIFEST.replace(",", "\t").encode("utf-16"),
     "LibreOffice": MANIFEST.encode(),
+    "units in brackets": MANIFEST.replace("mass_before", "mass_before [kg]")
+    .replace("905.", "0.905")
+    .encode(),
+    "a row of units, an empty one": (
+        MANIFEST.replace("\nk", "\n-,,mg\nk").replace("905.123", "905123") + ",,\n"
+    ).encode(),
+    "Excel's first line": b"sep=,\n" + MANIFEST.encode(),
 }
 
 
@@ -42,7 +49,15 @@ EXPORTS = {
 def test_a_manifest_is_what_a_spreadsheet_writes(tmp_path: Path, text: bytes) -> None:
     (tmp_path / "manifest.csv").write_bytes(text)
     row = {"block": "kühl", "file": "b1.csv", "mass_before": "905.123"}
-    assert read_manifest(tmp_path / "manifest.csv") == [(2, row)]
+    ((line, found),) = read_manifest(tmp_path / "manifest.csv")
+    assert found == row
+    assert text.splitlines()[line - 1].find(b"b1.csv") > 0 or text[:2] == b"\xff\xfe"
+
+
+def test_a_unit_that_is_not_known_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "manifest.csv").write_text(MANIFEST.replace("mass_before", "mass_before (oz)"))
+    with pytest.raises(UserError, match=r"mass_before: unit 'oz' unknown; give it in g"):
+        read_manifest(tmp_path / "manifest.csv")
 
 
 BLOCKS = {
@@ -72,6 +87,20 @@ def test_a_block_is_what_a_rig_writes(tmp_path: Path, text: str, encoding: str) 
     assert columns["brake_torque"][:2] == pytest.approx([1200.0, 1210.0])
     assert columns["disc_temperature"][0] == pytest.approx(20.0)
     assert np.isnan(columns["disc_temperature"][1])
+
+
+def test_a_sample_that_stands_alone_is_left_out_and_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    torque = 800.0 + 100.0 * np.sin(np.arange(200.0))
+    torque[77] = 1e6
+    table = pa.table({"t": 0.1 * np.arange(200), "brake_torque": torque, "particle_concentration": torque})
+    pq.write_table(table, tmp_path / "block.parquet")
+    names = ("t", "brake_torque", "particle_concentration")
+    columns = read_columns(tmp_path / "block.parquet", names, "trip", counts=names[2:])
+    assert np.flatnonzero(np.isnan(columns["brake_torque"])).tolist() == [77]
+    assert np.isfinite(columns["particle_concentration"]).all()
+    assert "brake_torque 1e+06 at 7.7 s stands alone; left out" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -118,5 +147,5 @@ def test_a_measurement_counts_once(tmp_path: Path, rows: tuple[str, ...], line: 
 
 def test_a_measured_file_in_the_manifests_place_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "block.parquet").write_bytes(b"PAR1\x00\r\x00\n")
-    with pytest.raises(UserError, match=r"block\.parquet: is no text; give a CSV manifest"):
+    with pytest.raises(UserError, match=r"block\.parquet: is no text; save it as CSV"):
         read_manifest(tmp_path / "block.parquet")

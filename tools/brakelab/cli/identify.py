@@ -50,6 +50,7 @@ def wear(
     config: Config,
     out: Annotated[Path, option("CAR.toml", "CONFIG to write, CAR.md beside it; or BLOCKS.csv")],
     axle: Annotated[str, option("AXLE", "Axle of the linings: front or rear")] = "front",
+    columns: Columns = None,
     from_logs: Annotated[
         bool, flag("--from-logs", "Write the blocks that stand for your drives, for a rig: BLOCKS.csv")
     ] = False,
@@ -62,7 +63,7 @@ def wear(
         return from_drives.blocks_from_drives(measured, config, axle, out)
     if len(measured) > 1:
         raise UserError(str(measured[1]), "", "one MANIFEST.csv; for blocks of drives give --from-logs")
-    return command.identify_wear(measured[0], config, axle, out)
+    return command.identify_wear(measured[0], config, axle, out, columns)
 
 
 @app.command()
@@ -71,6 +72,7 @@ def dust(
     config: Config,
     out: Annotated[Path, option("CAR.toml", "CONFIG to write, CAR.md beside it; or RUN.md")],
     axle: Annotated[str, option("AXLE", "Axle of the brakes: front or rear")] = "front",
+    columns: Columns = None,
     cycle: Annotated[
         bool, flag("--cycle", "Report one run of the WLTP-Brake cycle, for UN R179: RUN.md")
     ] = False,
@@ -79,8 +81,8 @@ def dust(
     from brakelab.identify.dust import command, cycle_page
 
     if cycle:
-        return cycle_page.report_cycle(manifest, config, axle, out)
-    return command.identify_dust(manifest, config, axle, out)
+        return cycle_page.report_cycle(manifest, config, axle, out, columns)
+    return command.identify_dust(manifest, config, axle, out, columns)
 
 
 @app.command()

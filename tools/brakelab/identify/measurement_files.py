@@ -3,9 +3,9 @@
 import codecs
 import csv
 import datetime
-import io
 import re
 from collections.abc import Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Final
 
@@ -14,14 +14,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from brakelab.arrays import Array
+from brakelab.identify.samples import alone, continued
 from brakelab.identify.units import UNITS, ZEROS
-from brakelab.logs.csv_header import find_header
+from brakelab.logs.csv_header import find_header, split_title
 from brakelab.logs.csv_rows import csv_columns, csv_rows
 from brakelab.logs.log_quality import Damage
 from brakelab.replay.log import log_hash
 from brakelab.results.mdf import load_asammdf
 from brakelab.results.outputs import check_outputs, config_files
 from ecu.errors import UserError
+from ecu.output import say
 from ecu.settings.config import Config, load_config
 
 WARMEST_COLD: Final = 250.0
@@ -40,6 +42,14 @@ NAMES: Final = ("file", "block", "trip", "test", "programme", "road_energy")
 """Columns of a manifest that measure nothing."""
 UTF16: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _DECIMAL: Final = re.compile(r"^([-+]?\d+),(\d+)$")
+_SEPARATOR: Final = re.compile(r'"?sep=.?"?', re.IGNORECASE)
+"""First line of a CSV file that Excel wrote for itself."""
+_WEIGHED: Final = {
+    "g": ("g", 1.0), "kg": ("g", 1e3), "mg": ("g", 1e-3), "mm": ("mm", 1.0), "µm": ("mm", 1e-3),
+    "μm": ("mm", 1e-3), "um": ("mm", 1e-3), "MJ": ("MJ", 1.0),
+}  # fmt: skip
+"""Units of a manifest: of what, and factor."""
+_NOTHING: Final = ("-", "–", "n/a", "na", "nan")
 _DATE: Final = re.compile(
     r"(?:(\d{1,4})[-./](\d{1,2})[-./](\d{1,4})[T ]+)?(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d*)?)"
 )
@@ -50,24 +60,59 @@ _EPOCH: Final = datetime.date(2000, 1, 1).toordinal()
 def read_manifest(path: Path) -> list[tuple[int, dict[str, str]]]:
     """Return the rows of a CSV manifest, each with its line in the file; decimal commas are points.
 
+    Units in brackets behind the names or in a row below them are converted to g, mm and mg; rows without a
+    word count for nothing.
+
     Raises:
-        UserError: it cannot be read.
+        UserError: it cannot be read, or has another unit.
     """
     try:
         given = path.read_bytes()
     except OSError as error:
         raise UserError(str(path), "", f"cannot be read ({error.strerror}); give a CSV manifest") from None
     if given[:2] not in UTF16 and b"\0" in given:
-        raise UserError(str(path), "", "is no text; give a CSV manifest, which names the measured files")
-    text = _decoded(given)
-    names = text.partition("\n")[0]
-    delimiter = max(",;\t", key=names.count)
-    rows = csv.DictReader(io.StringIO(text), delimiter=delimiter)
-    return [(rows.line_num, _cells(row)) for row in rows]
+        raise UserError(str(path), "", "is no text; save it as CSV: a table that names the measured files")
+    lines = _decoded(given).splitlines(keepends=True)
+    skipped = 1 if lines and _SEPARATOR.fullmatch(lines[0].strip()) else 0
+    delimiter = max(",;\t", key="".join(lines[skipped : skipped + 1]).count)
+    table = csv.reader(lines[skipped:], delimiter=delimiter)
+    columns = [split_title(title) for title in next(table, [])]
+    rows = [(table.line_num + skipped, [cell.strip() for cell in row]) for row in table if any(row)]
+    units = [unit for _, unit in columns]
+    if rows and _is_units(rows[0][1]):
+        units = [
+            under or unit for unit, under in zip_longest(units, rows.pop(0)[1][: len(units)], fillvalue="")
+        ]
+    factors = [_factor(path, name, unit) for (name, _), unit in zip(columns, units, strict=True)]
+    known = list(zip((name for name, _ in columns), factors, strict=True))
+    return [
+        (line, {name: _cell(text, by) for (name, by), text in zip(known, row, strict=False) if name})
+        for line, row in rows
+    ]
 
 
-def _cells(row: dict[str, str]) -> dict[str, str]:
-    return {name.strip(): _DECIMAL.sub(r"\1.\2", (cell or "").strip()) for name, cell in row.items() if name}
+def _is_units(row: list[str]) -> bool:
+    known = [cell.strip("[]()") for cell in row if cell and cell != "-"]
+    return bool(known) and all(cell in _WEIGHED for cell in known)
+
+
+def _factor(path: Path, name: str, unit: str) -> float:
+    """Return the factor to g, mm or mg from the unit that a manifest states of a column."""
+    unit = unit.strip("[]()")
+    own = "mm" if "thickness" in name else "mg" if "filter" in name else "g" if "mass" in name else ""
+    if not own or unit in ("", "-", own):
+        return 1.0
+    if unit not in _WEIGHED or (own == "mm") != (_WEIGHED[unit][0] == "mm"):
+        raise UserError(str(path), name, f"unit {unit!r} unknown; give it in {own}")
+    return _WEIGHED[unit][1] / _WEIGHED[own][1]
+
+
+def _cell(text: str, factor: float) -> str:
+    plain = "" if text.lower() in _NOTHING else _DECIMAL.sub(r"\1.\2", text)
+    try:
+        return plain if factor == 1.0 else f"{factor * float(plain):.12g}"
+    except ValueError:
+        return plain
 
 
 def _decoded(given: bytes) -> str:
@@ -81,7 +126,7 @@ def _decoded(given: bytes) -> str:
 
 
 def open_campaign(
-    manifest: Path, config: Path, axle: str, out: Path
+    manifest: Path, config: Path, axle: str, out: Path, columns: Path | None = None
 ) -> tuple[Config, tuple[Path, Path, Path]]:
     """Return the configuration, and what measurements of an `axle` will write: `out`, its page and picture.
 
@@ -95,7 +140,8 @@ def open_campaign(
     rows = read_manifest(manifest)
     files = [manifest.parent / row["file"] for _, row in rows if row.get("file")]
     _refuse_repeated(manifest, rows)
-    check_outputs(out, written, [manifest, *files, *config_files(config)], toml=True)
+    read = [manifest, *files, *config_files(config), *([columns] if columns else [])]
+    check_outputs(out, written, read, toml=True)
     return vehicle, written
 
 
@@ -111,8 +157,12 @@ def _refuse_repeated(manifest: Path, rows: Sequence[tuple[int, dict[str, str]]])
                 raise UserError(str(manifest), f"line {line}", remedy)
 
 
-def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]:
+def read_columns(
+    path: Path, names: tuple[str, ...], what: str, counts: Sequence[str] = (), stated: bool = True
+) -> dict[str, Array]:
     """Return columns of a CSV, Parquet or MDF4 file, each of shape (n,); NaN where a row has no value.
+
+    A sample that stands alone (`samples.py`) is left out, and said.
 
     A CSV file may be any that `header_of` reads; where it states units, columns are converted to those of
     `CONTRACT`, and a time that is a date or a time of day becomes seconds. In MDF4 `t` is the time of the
@@ -120,8 +170,10 @@ def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Arr
 
     Args:
         path: of the file.
-        names: of the columns, among them `t` [s].
+        names: of the columns, the first of the time.
         what: the file is one of.
+        counts: of `names`, whose peaks stand alone.
+        stated: units that the file states count; else a file of columns states them.
 
     Raises:
         UserError: it cannot be read, lacks a column, holds a non-number, or time does not rise.
@@ -129,32 +181,34 @@ def read_columns(path: Path, names: tuple[str, ...], what: str) -> dict[str, Arr
     if not path.is_file():
         raise UserError(str(path), "", f"no such file; the manifest names the file of each {what}, beside it")
     if path.suffix.lower() == ".mf4":
-        columns = _channels(path, names, what)
-        _check_time(path, columns["t"])
-        return columns
+        return _checked(path, _channels(path, names, what), counts)
     if path.suffix.lower() != ".parquet":
-        columns = _csv(path, names, what)
-        _check_time(path, columns["t"])
-        return columns
+        return _checked(path, _csv(path, names, what, stated), counts)
     try:
         table = pq.read_table(path)
     except (OSError, pa.ArrowInvalid) as error:
         reason = str(error).splitlines()[0]
         raise UserError(str(path), "", f"cannot be read as Parquet: {reason}") from None
-    if missing := [name for name in names if name not in table.column_names]:
-        raise UserError(str(path), missing[0], f"no such column; a {what} has {', '.join(names)}")
+    _refuse_missing(path, names, table.column_names, what)
     try:
         columns = {name: table[name].cast(pa.float64()).to_numpy(zero_copy_only=False) for name in names}
     except pa.ArrowInvalid:
         raise UserError(str(path), "", f"{', '.join(names)} must be numbers") from None
-    _check_time(path, columns["t"])
-    return columns
+    return _checked(path, columns, counts)
 
 
-def _csv(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]:
-    found, delimiter, above, units = header_of(path, list(names))
+def _refuse_missing(path: Path, names: tuple[str, ...], found: Sequence[str], what: str) -> None:
     if missing := [name for name in names if name not in found]:
-        raise UserError(str(path), missing[0], f"no such column; a {what} has {', '.join(names)}")
+        remedy = (
+            f"no such column; a {what} has {', '.join(names)}, this file {', '.join(found[:20])}; name its "
+            "own with --columns"
+        )
+        raise UserError(str(path), missing[0], remedy)
+
+
+def _csv(path: Path, names: tuple[str, ...], what: str, stated: bool) -> dict[str, Array]:
+    found, delimiter, above, units = header_of(path, list(names))
+    _refuse_missing(path, names, found, what)
     parts: dict[str, list[Array]] = {name: [] for name in names}
     damage = Damage()
     for lines, batch in csv_rows(path, found, delimiter, list(names), damage, above):
@@ -170,7 +224,9 @@ def _csv(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]:
     if damage.damaged:
         raise UserError(str(path), damage.first_damaged, "is damaged; mend or remove the line")
     return {
-        name: _converted(path, name, np.concatenate(values or [np.empty(0)]), units.get(name, ""))
+        name: _converted(
+            path, name, np.concatenate(values or [np.empty(0)]), units.get(name, "") if stated else ""
+        )
         for name, values in parts.items()
     }
 
@@ -245,9 +301,20 @@ def _seconds(cell: str) -> float:
     return 86400.0 * days + 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
 
 
-def _check_time(path: Path, t: Array) -> None:
+def _checked(path: Path, columns: dict[str, Array], counts: Sequence[str]) -> dict[str, Array]:
+    """Return columns whose time rises, without samples that stand alone."""
+    time, *others = columns
+    t = columns[time] = continued(columns[time])
     if not np.all(np.diff(t) > 0.0):
-        raise UserError(str(path), "t", "must rise from row to row")
+        raise UserError(str(path), time, "must rise from row to row")
+    for name in others:
+        if name in counts or not (strange := alone(columns[name])).any():
+            continue
+        place = int(np.argmax(strange))
+        more = f", and {count - 1} more" if (count := int(strange.sum())) > 1 else ""
+        say(f"{path}: {name} {columns[name][place]:g} at {t[place]:g} s stands alone{more}; left out")
+        columns[name] = np.where(strange, np.nan, columns[name])
+    return columns
 
 
 def _channels(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]:
@@ -257,8 +324,7 @@ def _channels(path: Path, names: tuple[str, ...], what: str) -> dict[str, Array]
 
     try:
         with MDF(path) as file:
-            if missing := [name for name in names[1:] if name not in file.channels_db]:
-                raise UserError(str(path), missing[0], f"no such channel; a {what} has {', '.join(names)}")
+            _refuse_missing(path, names[1:], list(file.channels_db), what)
             signals = [file.get(name) for name in names[1:]]
             t = np.asarray(signals[0].timestamps, np.float64)
             values = [np.interp(t, each.timestamps, np.asarray(each.samples, np.float64)) for each in signals]

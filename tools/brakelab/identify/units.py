@@ -18,5 +18,10 @@ UNITS: Final[dict[str, dict[str, float]]] = {
     "temperature": {"°C": 1.0, "C": 1.0, "degC": 1.0, "K": 1.0, "°F": 1.0 / 1.8, "F": 1.0 / 1.8},
 }
 """To s, Pa, N m, rad/s and K of difference; below zero: of the car's speed, to m/s."""
+COUNTED: Final[dict[str, dict[str, float]]] = {
+    "concentration": {"1/cm^3": 1.0, "1/cm³": 1.0, "#/cm³": 1.0, "1/l": 1e-3, "1/m^3": 1e-6, "1/m³": 1e-6},
+    "flow": {"m^3/s": 1.0, "m³/s": 1.0, "m^3/h": 1 / 3600, "m³/h": 1 / 3600, "l/s": 1e-3, "l/min": 1 / 6e4},
+}
+"""To 1/cm^3 and m^3/s."""
 ZEROS: Final = {"K": 273.15, "°F": 32.0, "F": 32.0}
 """Reading at 0 degC."""

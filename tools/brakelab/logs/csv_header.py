@@ -72,7 +72,7 @@ def _table(lines: list[str], delimiter: str) -> CsvHeader | None:
         return None
     width = len(rows[first])
     padded = [(row + [""] * width)[:width] for row in above[:2]]
-    parts = [_split(title) for title in padded[0]]
+    parts = [split_title(title) for title in padded[0]]
     if len(padded) > 1:
         below = [cell.strip().strip("[]()") for cell in padded[1]]
         parts = [(name, unit or under) for (name, unit), under in zip(parts, below, strict=True)]
@@ -111,7 +111,7 @@ def _above(rows: list[Row], first: int) -> list[Row]:
     return block
 
 
-def _split(title: str) -> tuple[str, str]:
+def split_title(title: str) -> tuple[str, str]:
     """Return name and unit of `Speed [km/h]`, `Speed (km/h)` or `"Speed"|"km/h"|0|200|10`."""
     title = title.strip()
     if title.count("|") >= 2:

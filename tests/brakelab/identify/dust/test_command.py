@@ -4,6 +4,7 @@ import csv
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("sklearn", reason="needs scikit-learn (extra learn)")
@@ -63,6 +64,26 @@ def test_trips_become_a_configuration_and_a_page(trips, capsys):
     assert all(name in page for name in ("LUT", "dynamic ANN", "monotone law", "trip 4 (test)", "Δt_b"))
     assert (trips / "car.svg").is_file()
     assert "from 3 trips" in capsys.readouterr().out
+
+
+def test_trips_with_a_file_of_columns_give_the_same_model(trips):
+    laws = []
+    for columns in (None, trips / "map.toml"):
+        identify_dust(trips / "manifest.csv", CONFIG, "front", trips / "car.toml", columns)
+        laws.append(load_config(trips / "car.toml").front.dust)
+        names = ("Zeit", "v", "p", "M", "T", "PN", "Q")
+        factors = (1e3, 3.6, 0.1, 1e-3, 1.0, 1e3, 3600.0)
+        for path in trips.glob("trip-*.csv") if columns is None else ():
+            rows = np.loadtxt(path, delimiter=",", skiprows=1) * factors
+            np.savetxt(path, rows, "%.7g", ";", header=";".join(names), comments="")
+        (trips / "map.toml").write_text(
+            '[columns]\ntime = ["Zeit", "ms"]\nspeed = ["v", "km/h"]\npressure = ["p", "MPa"]\n'
+            'torque = ["M", "kN m"]\ntemperature = ["T", "°C"]\nconcentration = ["PN", "1/l"]\n'
+            'flow = ["Q", "m³/h"]\n',
+            encoding="utf-8",
+        )
+    assert laws[0].model == laws[1].model
+    assert laws[1].numbers == pytest.approx(laws[0].numbers, rel=0.02, abs=0.02)
 
 
 def test_trips_of_a_car_whose_configuration_includes_another(trips):

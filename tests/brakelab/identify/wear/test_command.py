@@ -229,10 +229,66 @@ def mistyped_mass(folder: Path) -> None:
 
 
 def without_torque(folder: Path) -> None:
-    rewrite(folder / "town-calm.csv", lambda rows: [row.update(brake_torque="nan") for row in rows[::50]])
+    rewrite(folder / "town-calm.csv", lambda rows: [row.update(brake_torque="nan") for row in rows[40:140]])
+
+
+def german(folder: Path) -> None:
+    """Write every block as a rig does that its file of columns, one for all, describes."""
+    for path in folder.glob("*-*.csv"):
+        columns = np.loadtxt(path, delimiter=",", skiprows=1).T * [[1.0], [30.0 / np.pi], [1.0], [1.0], [1.0]]
+        rows = "\r\n".join(";".join(f"{v:.4f}".replace(".", ",") for v in row) for row in columns.T)
+        head = "Prüfstand;4\r\nBelag;Ä 5\r\nZeit;Drehzahl;p;Moment;T °C\r\ns;1/min;bar;Nm;°C\r\n"
+        path.write_bytes((head + rows + "\r\n").encode("latin-1"))
+    (folder / "map.toml").write_text(
+        '[columns]\ntime = ["Zeit", "s"]\npressure = ["p", "bar"]\ntorque = ["Moment", "Nm"]\n'
+        'speed = ["Drehzahl", "1/min"]\ntemperature = ["T °C", "°C"]\n',
+        encoding="utf-8",
+    )
+
+
+def slow_thermocouple(folder: Path) -> None:
+    def thin(rows):
+        for place, row in enumerate(rows):
+            row["disc_temperature"] = row["disc_temperature"] if place % 3 == 0 else ""
+
+    for path in folder.glob("*-*.csv"):
+        rewrite(path, thin)
+
+
+def mistyped_sample(folder: Path) -> None:
+    rewrite(folder / "town-calm.csv", lambda rows: rows[800].update(brake_torque="1e6"))
+
+
+def anew(folder: Path) -> None:
+    def from_zero(rows):
+        begin = before = float(rows[0]["t"])
+        for row in rows:
+            t = float(row["t"])
+            begin = t if t - before > 1.0 else begin
+            before, row["t"] = t, f"{t - begin:.4f}"
+
+    rewrite(folder / "town-calm.csv", from_zero)
+
+
+@pytest.mark.parametrize("write", [german, slow_thermocouple, mistyped_sample, anew])
+def test_blocks_as_rigs_write_them_give_the_same_law(blocks, write, capsys):
+    identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "plain.toml")
+    write(blocks)
+    columns = blocks / "map.toml" if write is german else None
+    capsys.readouterr()
+    identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "car.toml", columns)
+    laws = [load_config(blocks / f"{name}.toml").front.pad.coefficients for name in ("plain", "car")]
+    assert laws[1] == pytest.approx(laws[0], rel=0.03, abs=1e-5)
+    assert ("stands alone" in capsys.readouterr().err) == (write is mistyped_sample)
 
 
 BAD = {
+    "a thermocouple beside the disc": (
+        lambda folder: rewrite(
+            folder / "town-calm.csv", lambda rows: [row.update(disc_temperature="25") for row in rows]
+        ),
+        "disc_temperature: does not rise when the brake is applied",
+    ),
     "a thickness with a digit too few": (
         mistyped_thickness,
         "line 4, thickness_before_3 .* correct the read",

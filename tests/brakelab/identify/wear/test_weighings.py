@@ -51,7 +51,18 @@ def test_a_disc_may_gain_mass_from_its_pads():
     assert read_lost(MANIFEST, 2, row(disc_mass_after="9120.5"), PAD).disc_mass == pytest.approx(-0.1)
 
 
+def test_a_point_that_was_not_measured_counts_for_nothing():
+    lost = read_lost(MANIFEST, 2, row(inboard_thickness_after_1="", outboard_thickness_before_4=""), PAD)
+    assert lost.thin == pytest.approx((0.11, 0.10))
+    assert lost.wear == pytest.approx(0.105)
+    assert np.isnan(lost.along)
+
+
 BAD = {
+    "too few points": (
+        {f"inboard_thickness_after_{point}": "" for point in range(1, 4)},
+        "inboard_thickness_before_1…6: too few; measure all",
+    ),
     "one pad's mass alone": ({"outboard_mass_before": ""}, r"line 2, outboard_mass_before: give a number"),
     "a pad that gained": ({"inboard_mass_after": "226"}, "block b: inboard pad gained mass"),
     "both together, but other": (
@@ -59,7 +70,7 @@ BAD = {
         r"the pads lost 1.60 \+ 1.40 g, both together 5.00 g",
     ),
     "one pad's thickness alone": (
-        {"outboard_thickness_before_1": ""},
+        {f"outboard_thickness_before_{point}": "" for point in range(1, 7)},
         "outboard_thickness_before_1: give the thickness of both pads",
     ),
     "a point mistyped": (

@@ -46,16 +46,18 @@ def _per_megajoule(trips: list[Applications]) -> str:
     return ", ".join(f"{trip} {rate:.1e} 1/MJ" for trip, rate in rates.items())
 
 
-def identify_dust(manifest: Path, config: Path, axle: str, out: Path) -> int:
+def identify_dust(manifest: Path, config: Path, axle: str, out: Path, columns: Path | None = None) -> int:
     """Identify the emission of an axle's brakes; write `out` and `out`.md, return 0.
+
+    `columns`: file of columns of the trips.
 
     Raises:
         UserError: an argument or a file is invalid.
         RunFault: no model explains the trips.
     """
-    vehicle, written = open_campaign(manifest, config, axle, out)
+    vehicle, written = open_campaign(manifest, config, axle, out, columns)
     page = written[1]
-    trips = read_trips(manifest, vehicle, axle)
+    trips = read_trips(manifest, vehicle, axle, columns)
     trained, test = [trip for trip in trips if not trip.test], [trip for trip in trips if trip.test]
     judged = judge_all(trained, test)
     chosen = choose(judged)

@@ -114,8 +114,8 @@ def findings(run: Run) -> list[str]:
     return found
 
 
-def report_cycle(manifest: Path, config: Path, axle: str, out: Path) -> int:
-    """Write the report of a run of the WLTP-Brake cycle; return 0.
+def report_cycle(manifest: Path, config: Path, axle: str, out: Path, columns: Path | None = None) -> int:
+    """Write the report of a run of the WLTP-Brake cycle; return 0. `columns`: file of columns of the trips.
 
     Raises:
         UserError: an argument or a file is invalid.
@@ -127,8 +127,8 @@ def report_cycle(manifest: Path, config: Path, axle: str, out: Path) -> int:
     vehicle = load_config(config)
     rows = [row for _, row in read_manifest(manifest)]
     files = [manifest.parent / row[name] for row in rows for name in ("file", "reference") if row.get(name)]
-    check_outputs(out, (out,), [manifest, *files, *config_files(config)])
-    run = read_run(manifest, vehicle, axle)
+    check_outputs(out, (out,), [manifest, *files, *config_files(config), *([columns] if columns else [])])
+    run = read_run(manifest, vehicle, axle, columns)
     found = findings(run)
     said = f"Found: {'; '.join(found)}." if found else "Nothing is off what is published of the cycle."
     tables = [whole_table(run), trip_table(run)]

@@ -97,13 +97,13 @@ class Run(NamedTuple):
         return 1e3 * lost / self.sum_of("km")
 
 
-def read_run(manifest: Path, config: Config, axle: str) -> Run:
-    """Return the run of a manifest.
+def read_run(manifest: Path, config: Config, axle: str, given: Path | None = None) -> Run:
+    """Return the run of a manifest. `given`: file of columns of its trips.
 
     Raises:
         UserError: a file, a row or a value of it is invalid.
     """
-    columns = trip_columns(config, axle)
+    columns = trip_columns(config, axle, given)
     trips, whole = [], dict.fromkeys(WHOLE, math.nan)
     rows = read_manifest(manifest)
     if not rows:
@@ -192,7 +192,7 @@ def _run(path: Path, trip: Recorded, reference: Path | None, radius: float) -> T
 def _solid(path: Path, trip: Recorded, air: Array) -> float:
     """Return the solid particles of a trip; NaN: not counted."""
     try:
-        columns = read_columns(path, ("t", SOLID), "trip")
+        columns = read_columns(path, ("t", SOLID), "trip", counts=(SOLID,))
     except UserError as error:
         if error.place == SOLID and "no such" in error.remedy:
             return math.nan

@@ -2,7 +2,8 @@
 
 The manifest is a CSV file, a row a trip: `trip`, `file`, `test` (1: held out). A trip's file (CSV or Parquet)
 has `t` [s], `vehicle_speed` [m/s], `calliper_pressure_fr` [bar], `brake_torque_fr` [N m],
-`disc_temperature_fr` [degC], `particle_concentration` [1/cm^3 in the sampled flow] and `tunnel_flow` [m^3/s].
+`disc_temperature_fr` [degC], `particle_concentration` [1/cm^3 in the sampled flow] and `tunnel_flow` [m^3/s],
+or the names and units of a file of columns.
 Rows without a value are between two samples: the counter has one a second, the others about ten.
 """
 
@@ -22,9 +23,11 @@ from brakelab.identify.dust.features import (
     extract,
 )
 from brakelab.identify.friction.check import refuse_units
-from brakelab.identify.friction.columns import Columns
+from brakelab.identify.friction.columns import Columns, load_columns
+from brakelab.identify.friction.reader import in_si
 from brakelab.identify.friction.recording import Recording
 from brakelab.identify.measurement_files import check_celsius, read_columns, read_manifest
+from brakelab.identify.units import COUNTED
 from brakelab.stretches import stretches
 from ecu.errors import UserError
 from ecu.settings.config import Config
@@ -51,14 +54,16 @@ LONGEST_TOP: Final = 10.0  # s at the greatest value, to the digit
 MOST_FLOW: Final = 5.0  # m^3/s
 
 
-def read_trips(manifest: Path, config: Config, axle: str) -> list[Applications]:
+def read_trips(manifest: Path, config: Config, axle: str, given: Path | None = None) -> list[Applications]:
     """Return the applications of every trip of a CSV manifest, measured on a brake of an `axle` of `config`.
+
+    `given`: file of columns of all trips.
 
     Raises:
         UserError: a file, a row or a value of it is invalid.
     """
     trips = []
-    columns = trip_columns(config, axle)
+    columns = trip_columns(config, axle, given)
     for line, row in read_manifest(manifest):
         if not row.get("trip") or not row.get("file") or row.get("test") not in ("0", "1"):
             raise UserError(str(manifest), f"line {line}", "needs trip, file and test (1: held out, else 0)")
@@ -77,9 +82,14 @@ def read_trips(manifest: Path, config: Config, axle: str) -> list[Applications]:
     return trips
 
 
-def trip_columns(config: Config, axle: str) -> Columns:
-    """Return what describes the files of trips, of a brake of an `axle` of `config`."""
-    return Columns.contract(IN_ORDER, "m/s", config, axle)
+def trip_columns(config: Config, axle: str, given: Path | None = None) -> Columns:
+    """Return what describes the files of trips, of a brake of an `axle`: `given`, else the contract.
+
+    Raises:
+        UserError: the file of columns is invalid.
+    """
+    contract = Columns.contract(IN_ORDER, "m/s", config, axle)
+    return contract if given is None else load_columns(given, contract)
 
 
 def read_trip(path: Path, name: str, test: bool, described: Columns) -> Recorded:
@@ -88,7 +98,7 @@ def read_trip(path: Path, name: str, test: bool, described: Columns) -> Recorded
     Raises:
         UserError: the file or a value of it is invalid.
     """
-    columns = read_columns(path, COLUMNS, "trip")
+    columns = _read(path, described)
     t = columns["t"]
     if len(t) < 2:
         raise UserError(str(path), "t", "must rise from row to row")
@@ -103,6 +113,23 @@ def read_trip(path: Path, name: str, test: bool, described: Columns) -> Recorded
     )  # fmt: skip
     _check_units(path, trip, described)
     return trip
+
+
+def _read(path: Path, described: Columns) -> dict[str, Array]:
+    """Return a trip by `COLUMNS`, in their units."""
+    of = described.columns
+    time, pressure, torque, speed, heat = of.time, of.pressure, of.torque, of.speed, of.temperature
+    given = (time, speed, pressure, torque, heat, of.concentration, of.flow)
+    names = tuple(name for name, _ in given)
+    read = read_columns(path, names, "trip", counts=names[5:6], stated=names == COLUMNS)
+    values = [read[name] for name, _ in given]
+    for place, quantity in enumerate(("time", "speed", "pressure", "torque", "temperature")):
+        values[place] = in_si(described, quantity, values[place])
+    values[1] = values[1] * described.brake.tyre_radius
+    values[2] = 1e-5 * values[2]
+    values[5] = values[5] * COUNTED["concentration"][of.concentration[1]]
+    values[6] = values[6] * COUNTED["flow"][of.flow[1]]
+    return dict(zip(COLUMNS, values, strict=True))
 
 
 def _check_units(path: Path, trip: Recorded, columns: Columns) -> None:

@@ -30,6 +30,7 @@ CLEARER: Final = 4.0  # a mistake must explain the numbers better by this much, 
 HIGHEST_TEMPERATURE: Final = 900.0  # degC
 LOWEST_TEMPERATURE: Final = -40.0  # degC
 WARM: Final = 250.0  # degC; no programme keeps a disc above this all the time
+STILL: Final = 1.0  # K in every application, of a thermocouple that does not see the disc
 SAMPLES: Final = (1e-4, 0.05)  # s between them, least and greatest
 
 
@@ -111,6 +112,9 @@ def refuse_units(applications: Sequence[Recording], columns: Columns, where: str
         UserError: names the column, the finding and the remedy.
     """
     numbers = numbers_of(applications, columns)
+    if max(float(np.ptp(one.temperature)) for one in applications) < STILL:
+        name = columns.columns.temperature[0]
+        raise UserError(where, name, "does not rise when the brake is applied; give the disc's thermocouple")
     mistake = likeliest(numbers, columns, CONFIGURED)
     if mistake is None or mistake.place not in UNITS:  # areas and radii count for nothing here
         return

@@ -8,7 +8,9 @@ torque = ["Torque", "N m"]
 speed = ["Speed", "rpm"]           # rpm, 1/min, rad/s of the disc; km/h, m/s, mph of the car
 temperature = ["T_disc", "°F"]
 section = "Step"                   # optional: number of the section of the programme, in every row
-[brake]                            # as in config/plant/linings.toml
+concentration = ["PN", "1/cm³"]    # of trips with a particle counter
+flow = ["Q_tunnel", "m³/h"]        # likewise
+[brake]                            # as in config/plant/linings.toml; where CONFIG is given, its own
 [rig]                              # inertia, pads, push_out_pressure
 [disc]                             # optional; without, heating is found from the stops
 [uncertainty]                      # optional, see `Uncertainty`
@@ -20,7 +22,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from brakelab.identify.units import UNITS
+from brakelab.identify.units import COUNTED, UNITS
 from brakelab.plant.friction.law import NotNegative, Positive, RigBrake, Section
 from brakelab.plant.linings import Lining
 from ecu.settings.config import Axle, Config, new_params
@@ -36,10 +38,12 @@ class Names(Section):
     speed: Column
     temperature: Column
     section: Annotated[str, Field(min_length=1)] | None = None
+    concentration: Column = ("particle_concentration", "1/cm^3")
+    flow: Column = ("tunnel_flow", "m^3/s")
 
     @model_validator(mode="after")
     def _units(self) -> Self:
-        for quantity, units in UNITS.items():
+        for quantity, units in (UNITS | COUNTED).items():
             unit = getattr(self, quantity)[1]
             if unit not in units:
                 raise ValueError(f"unit {unit!r} of {quantity} unknown; one of {', '.join(units)}")
@@ -124,10 +128,17 @@ class Columns(Section):
         return cls(columns=given, brake=pad, rig=rig, disc=disc)
 
 
-def load_columns(path: Path) -> Columns:
-    """Return the file of columns `path`. Raises `UserError`, one line."""
+def load_columns(path: Path, known: Columns | None = None) -> Columns:
+    """Return the file of columns `path`; brake, rig and disc that it leaves out are those `known`.
+
+    Raises:
+        UserError: one line.
+    """
+    given = read_toml(path)
+    if known is not None:
+        given = known.model_dump(include={"brake", "rig", "disc"}) | given
     try:
-        return Columns.model_validate(read_toml(path))
+        return Columns.model_validate(given)
     except ValidationError as error:
         raise describe(error, str(path), Columns) from None
 

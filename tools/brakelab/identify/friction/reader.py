@@ -15,6 +15,7 @@ from brakelab.arrays import Vector
 from brakelab.identify.friction.columns import Columns, load_columns
 from brakelab.identify.friction.recording import NAMES, Recording
 from brakelab.identify.measurement_files import header_of, numbers_of
+from brakelab.identify.samples import alone, continued
 from brakelab.identify.units import UNITS, ZEROS
 from brakelab.logs.csv_rows import csv_rows
 from brakelab.logs.log_quality import Damage
@@ -24,8 +25,6 @@ Places = NDArray[np.int64]
 Labels = NDArray[np.str_]
 
 LEAST_SAMPLES = 100
-ANEW = 1.0  # of a file's time, by which a stop may begin later than the first
-APART = 100.0  # likewise, between stops whose time begins anew
 PLACES = {".csv": ("line", 2), ".txt": ("line", 2), ".parquet": ("row", 1), ".mf4": ("sample", 1)}
 """Name of a row for each file ending, and the number of the first."""
 
@@ -41,8 +40,10 @@ class Read(NamedTuple):
     """Rows that were left out, one line; empty if none."""
 
 
-def read_recording(path: Path, columns: Path | None = None) -> Read:
+def read_recording(path: Path, columns: Path | None = None, known: Columns | None = None) -> Read:
     """Return the recording `path`; `columns` defaults to the file of the same name that ends in .toml.
+
+    `known`: brake, rig and disc, where the file of columns has none.
 
     Raises:
         UserError: a file, a column or a unit is missing or wrong, or too few rows are whole; one line.
@@ -57,11 +58,19 @@ def read_recording(path: Path, columns: Path | None = None) -> Read:
             raise UserError(str(columns), "", "no such file")
         remedy = "no file of columns; give --columns (docs/results/friction-lab.md has one)"
         raise UserError(str(path), "", remedy)
-    described = load_columns(beside)
+    described = load_columns(beside, known)
     names = [getattr(described.columns, quantity)[0] for quantity in NAMES]
     damage = Damage()
     word, first = PLACES[path.suffix.lower()]
     lines, raw, labels = _joined(list(_rows(path, names, described.columns.section, damage, first)))
+    strange = np.array([alone(values) for values in raw[1:]])
+    lone = strange.any(axis=0)
+    if lone.any():
+        row = int(np.argmax(lone))
+        which = 1 + int(np.argmax(strange[:, row]))
+        said = f"{word} {lines[row]} ({names[which]} {raw[which, row]:g} stands alone)"
+        damage.note_damage(int(lone.sum()), said)
+        lines, raw, labels = lines[~lone], raw[:, ~lone], labels[~lone]
     whole = np.isfinite(raw)
     missing = ~whole.all(axis=0)
     if missing.any():
@@ -69,7 +78,7 @@ def read_recording(path: Path, columns: Path | None = None) -> Read:
         name = names[int(np.argmin(whole[:, row]))]
         damage.note_damage(int(missing.sum()), f"{word} {lines[row]} ({name} is no number)")
     lines, raw, labels = lines[~missing], raw[:, ~missing], labels[~missing]
-    raw[0] = _continued(raw[0])
+    raw[0] = continued(raw[0])
     back = np.concatenate([[False], raw[0, 1:] <= np.maximum.accumulate(raw[0])[:-1]])[: raw.shape[1]]
     if back.any():
         damage.note_damage(int(back.sum()), f"{word} {lines[int(np.argmax(back))]} (time does not rise)")
@@ -125,17 +134,6 @@ def _labels(cells: Sequence[object]) -> Labels:
     return np.array(["" if cell is None else str(cell) for cell in cells], np.str_)
 
 
-def _continued(time: Vector) -> Vector:
-    """Return a time that begins anew with every stop as one that goes on, stops `APART` apart."""
-    if len(time) < 3:
-        return time
-    before, here, after = time[:-2], time[1:-1], time[2:]
-    anew = 1 + np.flatnonzero((here < before) & (after > here) & (after < before) & (here - time[0] < ANEW))
-    steps = np.zeros(len(time))
-    steps[anew] = time[anew - 1] - time[anew] + APART
-    return np.asarray(time + np.cumsum(steps))
-
-
 def _refuse_missing(path: Path, names: list[str], found: list[str]) -> None:
     for name in names:
         if name not in found:
@@ -175,16 +173,19 @@ def _text(sample: object) -> str:
 
 def _in_si(raw: Vector, described: Columns) -> Recording:
     """Return the numbers of a file in the units of a recording."""
-    si = {}
-    for quantity, values in zip(NAMES, raw, strict=True):
-        unit = getattr(described.columns, quantity)[1]
-        factor = UNITS[quantity][unit]
-        if factor < 0.0:
-            factor = -factor / described.brake.tyre_radius
-        si[quantity] = (values - ZEROS.get(unit, 0.0)) * factor
+    si = {quantity: in_si(described, quantity, values) for quantity, values in zip(NAMES, raw, strict=True)}
     si["torque"] = _positive(si["torque"]) * (2.0 / described.rig.pads)
     si["speed"] = _positive(si["speed"])
     return Recording(**si)
+
+
+def in_si(described: Columns, quantity: str, values: Vector) -> Vector:
+    """Return a quantity of `UNITS` from the unit that the file of columns states; speed is the disc's."""
+    unit = getattr(described.columns, quantity)[1]
+    factor = UNITS[quantity][unit]
+    if factor < 0.0:
+        factor = -factor / described.brake.tyre_radius
+    return np.asarray((values - ZEROS.get(unit, 0.0)) * factor)
 
 
 def _positive(values: Vector) -> Vector:

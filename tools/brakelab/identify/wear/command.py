@@ -112,17 +112,19 @@ def _refuse_disagreeing(blocks: list[Block], what: str, wear: Array, mass: Array
         raise UserError(f"block {blocks[place].name}", "", remedy)
 
 
-def identify_wear(manifest: Path, config: Path, axle: str, out: Path) -> int:
+def identify_wear(manifest: Path, config: Path, axle: str, out: Path, columns: Path | None = None) -> int:
     """Identify the wear law of an axle's linings; write `out` and `out`.md, return 0.
+
+    `columns`: file of columns of the blocks.
 
     Raises:
         UserError: an argument or a file is invalid.
         RunFault: no law explains the blocks.
     """
-    vehicle, written = open_campaign(manifest, config, axle, out)
+    vehicle, written = open_campaign(manifest, config, axle, out, columns)
     page = written[1]
     brake: Axle = getattr(vehicle, axle)
-    blocks = read_blocks(manifest, vehicle, axle)
+    blocks = read_blocks(manifest, vehicle, axle, columns)
     try:
         blocks = _agreeing(blocks)
         fused, regressors = _measured(blocks)

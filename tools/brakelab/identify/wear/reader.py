@@ -3,7 +3,8 @@
 The manifest is a CSV file, a row a block: `block`, `file`, and what was weighed and measured before and after
 (`weighings`). A block's file (CSV or Parquet) has `t` [s], `omega` [rad/s], `calliper_pressure` [bar],
 `brake_torque` [N m] and `disc_temperature` [degC], or any other names and units that a file of columns beside
-it states, as of `lab run`; stops are found by the pressure. `programme` names what the rig was asked to do.
+it or `--columns` states, as of `lab run`; stops are found by the pressure. `programme` names what the rig was
+asked to do.
 """
 
 import math
@@ -19,6 +20,7 @@ from brakelab.identify.friction.reader import read_recording
 from brakelab.identify.friction.recording import Recording
 from brakelab.identify.friction.sequence import read_sequence
 from brakelab.identify.measurement_files import check_celsius, read_columns, read_manifest
+from brakelab.identify.samples import bridged
 from brakelab.identify.wear.reproduced import Reproduced, reproduced
 from brakelab.identify.wear.weighings import Lost, read_lost
 from brakelab.results.wear import regressors_of
@@ -33,6 +35,7 @@ IN_ORDER: Final = ("t", "calliper_pressure", "brake_torque", "omega", "disc_temp
 FEWEST_APPLICATIONS: Final = 100  # applications of a block; the thesis has 250 and more
 PRESSED: Final = 1.0  # bar
 SHORTEST_APPLICATION: Final = 0.1  # s of an application
+LONGEST_GAP: Final = 0.5  # s between two samples of a column
 SLOPE_S: Final = 0.2  # s to either side, for the slope of the speed
 HIGHEST_TEMPERATURE: Final = 1100.0  # degC
 SPECIFIC: Final = (2e-3, 20.0)  # g/MJ: linings 0.05 to 1, some tens of times less or more where cold or hot
@@ -52,8 +55,10 @@ class Block(NamedTuple):
     """Beside the programme that the manifest names."""
 
 
-def read_blocks(manifest: Path, config: Config, axle: str) -> list[Block]:
+def read_blocks(manifest: Path, config: Config, axle: str, columns: Path | None = None) -> list[Block]:
     """Return the blocks of a manifest, measured on a brake of an `axle` of `config`.
+
+    `columns`: file of columns of all blocks; without, the one beside each, or the contract's names and units.
 
     Raises:
         UserError: a file, a row or a value of it is not right.
@@ -61,16 +66,18 @@ def read_blocks(manifest: Path, config: Config, axle: str) -> list[Block]:
     rows = read_manifest(manifest)
     if not rows:
         raise UserError(str(manifest), "", "no blocks; give a row with block, file, mass_before, mass_after")
-    return [_block(manifest, line, row, config, axle) for line, row in rows]
+    return [_block(manifest, line, row, config, axle, columns) for line, row in rows]
 
 
-def _block(manifest: Path, line: int, row: dict[str, str], config: Config, axle: str) -> Block:
+def _block(
+    manifest: Path, line: int, row: dict[str, str], config: Config, axle: str, given: Path | None
+) -> Block:
     where = f"line {line}"
     if not row.get("block") or not row.get("file"):
         raise UserError(str(manifest), where, "needs block, file, mass_before and mass_after")
     lost = read_lost(manifest, line, row, getattr(config, axle).pad)
     path = manifest.parent / row["file"]
-    stops, columns = read_stops(path, Columns.contract(IN_ORDER, "rad/s", config, axle))
+    stops, columns = read_stops(path, Columns.contract(IN_ORDER, "rad/s", config, axle), given)
     if stops:
         _check_physics(path, stops, columns)
     if len(stops) < FEWEST_APPLICATIONS:
@@ -113,17 +120,19 @@ def _beside(
     return reproduced(row["block"], programme, stops, radius, road)
 
 
-def read_stops(path: Path, contract: Columns) -> tuple[list[dict[str, Array]], Columns]:
+def read_stops(
+    path: Path, contract: Columns, given: Path | None = None
+) -> tuple[list[dict[str, Array]], Columns]:
     """Return the applications of a block, each by `COLUMNS` with arrays of shape (n,), and their description.
 
-    It is `contract`, or the file of columns beside `path`, where there is one.
+    It is `contract`, or the file of columns `given` or beside `path`, where there is one.
 
     Raises:
         UserError: the file cannot be read or lacks a column.
     """
     described, push_out = contract, 0.0
-    if path.with_suffix(".toml").is_file():
-        read = read_recording(path)
+    if given is not None or path.with_suffix(".toml").is_file():
+        read = read_recording(path, given, contract)
         if read.damaged:
             say(read.damaged)
         described, push_out = read.columns, read.columns.rig.push_out_pressure
@@ -131,6 +140,8 @@ def read_stops(path: Path, contract: Columns) -> tuple[list[dict[str, Array]], C
         columns = dict(zip(COLUMNS, (time, speed, 1e-5 * pressure, torque, heat), strict=True))
     else:
         columns = read_columns(path, COLUMNS, "block")
+        t = columns["t"]
+        columns = {name: bridged(t, values, LONGEST_GAP) for name, values in columns.items()}
     pressed = columns["calliper_pressure"] > push_out + PRESSED
     stops = [
         {name: column[start:end] for name, column in columns.items()} for start, end in stretches(pressed)
@@ -151,7 +162,9 @@ def _check_physics(path: Path, stops: list[dict[str, Array]], columns: Columns) 
     for name in COLUMNS[1:]:
         everything = np.concatenate([stop[name] for stop in stops])
         if not np.isfinite(everything).all():
-            raise UserError(str(path), name, "has gaps while the brake is applied; fill them")
+            raise UserError(
+                str(path), name, f"has gaps over {LONGEST_GAP} s while the brake is applied; fill them"
+            )
     heat = np.concatenate([stop["disc_temperature"] for stop in stops])
     check_celsius(path, "disc_temperature", heat, HIGHEST_TEMPERATURE)
     applications = [

@@ -18,6 +18,7 @@ from ecu.errors import UserError
 from ecu.settings.pad import Pad
 
 POINTS: Final = 6
+FEWEST_POINTS: Final = 4  # of a pad
 UNEVEN: Final = 0.3  # mm by which a point may lose more or less than the others, beside what all lose
 SIDES: Final = ("inboard", "outboard")
 THINNEST_DISC, THICKEST_DISC = 3.0, 60.0  # mm
@@ -80,17 +81,17 @@ def read_lost(manifest: Path, line: int, cells: dict[str, str], pad: Pad) -> Los
     if together and any(apart) and abs(mass - sum(sides)) > SURE * math.sqrt(6.0) * BALANCE:
         remedy = f"the pads lost {sides[0]:.2f} + {sides[1]:.2f} g, both together {mass:.2f} g; correct one"
         raise UserError(str(manifest), f"{row.where}, block {cells['block']}", remedy)
-    names = [f"{side}_" for side in SIDES if row.has(f"{side}_thickness_before_1")]
-    points = [_points(row, name, pad) for name in names or [""] if row.has(f"{name}thickness_before_1")]
+    names = [f"{side}_" for side in SIDES if _measured(row, f"{side}_")]
+    points = [_points(row, name, pad) for name in names or [""] if _measured(row, name)]
     if len(names) == 1:
         other = next(side for side in SIDES if f"{side}_" not in names)
         remedy = "give the thickness of both pads, or of neither"
         raise UserError(str(manifest), f"{row.where}, {other}_thickness_before_1", remedy)
     each = np.mean(points, axis=0) if points else np.full(POINTS, np.nan)
-    thin = (float(points[0].mean()), float(points[1].mean())) if names else (math.nan, math.nan)
+    thin = (float(np.nanmean(points[0])), float(np.nanmean(points[1]))) if names else (math.nan, math.nan)
     return Lost(
         mass,
-        float(each.mean()),
+        float(np.nanmean(each)) if points else math.nan,
         (float(sides[0]), float(sides[1])),
         thin,
         float(each[:2].mean() - each[4:].mean()),
@@ -109,10 +110,19 @@ def _mass(row: _Row, side: str) -> float:
     return before - after
 
 
+def _measured(row: _Row, side: str) -> bool:
+    return any(row.has(f"{side}thickness_before_{point}") for point in range(1, POINTS + 1))
+
+
 def _points(row: _Row, side: str, pad: Pad) -> Array:
-    """Return what each point of a pad lost [mm]."""
+    """Return what each point of a pad lost [mm], NaN where it was not measured before and after."""
     lost: list[float] = []
     names = [f"{side}thickness_before_{point}" for point in range(1, POINTS + 1)]
+    names = [name for name in names if row.has(name) and row.has(name.replace("before", "after"))]
+    if len(names) < FEWEST_POINTS:
+        raise UserError(
+            str(row.manifest), f"{row.where}, {side}thickness_before_1…{POINTS}", "too few; measure all"
+        )
     for name in names:
         before, after = row.number(name), row.number(name.replace("before", "after"))
         if not 0.0 < before < pad.thickness_new + 1.0:
@@ -123,7 +133,9 @@ def _points(row: _Row, side: str, pad: Pad) -> Array:
     if np.mean(lost) <= 0.0:
         remedy = f"the pads grew by {-1e3 * float(np.mean(lost)):.0f} µm; measure them cold, same points"
         raise UserError(str(row.manifest), f"{row.where}, {side}thickness_after_1…{POINTS}", remedy)
-    return np.array(lost)
+    everywhere = np.full(POINTS, np.nan)
+    everywhere[[int(name[-1]) - 1 for name in names]] = lost
+    return everywhere
 
 
 def _refuse_stray(row: _Row, names: list[str], lost: Array, uneven: float) -> None:

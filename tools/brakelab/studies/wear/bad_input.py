@@ -80,7 +80,9 @@ BLOCKS: Final[dict[str, Spoil]] = {
     "a mass that is no number": _first(MANIFEST, mass_before="450 g"),
     "a temperature in °F": _scaled(BLOCK, "disc_temperature", 1.8, 32.0),
     "a temperature in K": _scaled(BLOCK, "disc_temperature", 1.0, 273.15),
-    "a gap in the temperature": _rows(BLOCK, lambda rows: rows[99].update(disc_temperature="")),
+    "a gap in the temperature": _rows(
+        BLOCK, lambda rows: [row.update(disc_temperature="") for row in rows[60:140]] and None
+    ),
     "a column of another name": _text(BLOCK, lambda text: text.replace("omega", "speed", 1)),
     "time that goes back": _rows(BLOCK, lambda rows: rows[50].update(t="0.0")),
     "an empty manifest": _text(MANIFEST, lambda text: text.splitlines()[0] + "\n"),
