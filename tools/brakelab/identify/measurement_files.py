@@ -14,8 +14,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from brakelab.arrays import Array
-from brakelab.identify.samples import alone, continued
-from brakelab.identify.units import UNITS, ZEROS
+from brakelab.identify.samples import BEYOND, PEAKS, alone, continued
+from brakelab.identify.units import COUNTED, UNITS, ZEROS
 from brakelab.logs.csv_header import find_header, split_title
 from brakelab.logs.csv_rows import csv_columns, csv_rows
 from brakelab.logs.log_quality import Damage
@@ -36,6 +36,9 @@ CONTRACT: Final = {
     "calliper_pressure": ("pressure", "bar"),
     "brake_torque": ("torque", "N m"),
     "disc_temperature": ("temperature", "degC"),
+    "particle_concentration": ("concentration", "1/cm^3"),
+    "solid_concentration": ("concentration", "1/cm^3"),
+    "tunnel_flow": ("flow", "m^3/s"),
 }
 """Quantity and unit of the columns of blocks and trips."""
 NAMES: Final = ("file", "block", "trip", "test", "programme", "road_energy")
@@ -172,7 +175,7 @@ def read_columns(
         path: of the file.
         names: of the columns, the first of the time.
         what: the file is one of.
-        counts: of `names`, whose peaks stand alone.
+        counts: of `names`, whose peaks may stand alone.
         stated: units that the file states count; else a file of columns states them.
 
     Raises:
@@ -236,7 +239,8 @@ def _converted(path: Path, name: str, values: Array, unit: str) -> Array:
     quantity, own = CONTRACT.get(name.removesuffix("_fr"), ("", ""))
     if not unit or not quantity or unit == own:
         return values
-    known = {one: factor for one, factor in UNITS[quantity].items() if factor * UNITS[quantity][own] > 0.0}
+    units = (UNITS | COUNTED)[quantity]
+    known = {one: factor for one, factor in units.items() if factor * units[own] > 0.0}
     if unit not in known:
         raise UserError(str(path), name, f"unit {unit!r} unknown; one of {', '.join(known)}")
     return np.asarray((values - ZEROS.get(unit, 0.0)) * (known[unit] / known[own]))
@@ -308,7 +312,8 @@ def _checked(path: Path, columns: dict[str, Array], counts: Sequence[str]) -> di
     if not np.all(np.diff(t) > 0.0):
         raise UserError(str(path), time, "must rise from row to row")
     for name in others:
-        if name in counts or not (strange := alone(columns[name])).any():
+        strange = alone(columns[name], PEAKS if name in counts else BEYOND)
+        if not strange.any():
             continue
         place = int(np.argmax(strange))
         more = f", and {count - 1} more" if (count := int(strange.sum())) > 1 else ""

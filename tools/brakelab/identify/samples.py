@@ -13,16 +13,17 @@ APART: Final = 100.0  # likewise, between stops whose time begins anew
 NEAR: Final = 5  # samples, of which the median shows what is usual: two may be mistyped
 FEWEST_SAMPLES: Final = 50  # samples that show a range
 BEYOND: Final = 3.0  # times the range of what is usual: noise alone stays within
+PEAKS: Final = 100.0  # likewise, of a particle counter
 
 
-def alone(values: Array) -> NDArray[np.bool_]:
+def alone(values: Array, beyond: float = BEYOND) -> NDArray[np.bool_]:
     """Return which samples, shape (n,), are far from those around, beyond all that the others do."""
     found = np.zeros(len(values), np.bool_)
     known = np.flatnonzero(np.isfinite(values))
     if len(known) >= FEWEST_SAMPLES:
         sound = values[known]
         around = np.median(sliding_window_view(np.pad(sound, NEAR // 2, "edge"), NEAR), axis=1)
-        found[known] = np.abs(sound - around) > BEYOND * np.ptp(around)
+        found[known] = np.abs(sound - around) > beyond * np.ptp(around)
     return found
 
 

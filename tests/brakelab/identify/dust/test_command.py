@@ -1,6 +1,7 @@
 """`brake-ecu identify dust`: from simulated trips to a configuration; what bad trips give."""
 
 import csv
+import re
 import shutil
 from pathlib import Path
 
@@ -62,8 +63,21 @@ def test_trips_become_a_configuration_and_a_page(trips, capsys):
     assert params["dust_version"] != new_params(before)[0]["dust_version"]
     page = (trips / "car.md").read_text()
     assert all(name in page for name in ("LUT", "dynamic ANN", "monotone law", "trip 4 (test)", "Δt_b"))
-    assert (trips / "car.svg").is_file()
+    drawn = (trips / "car.svg").read_text("utf-8")
+    assert all(f"EF by {name}" in drawn for name in ("LUT, ", "dynamic ANN", "monotone law"))
+    assert "resampled" in drawn
     assert "from 3 trips" in capsys.readouterr().out
+
+
+def test_a_trip_unlike_the_others_is_named(short_trips, capsys):
+    path = short_trips / "trip-2.csv"
+    rows = np.loadtxt(path, delimiter=",", skiprows=1)
+    rows[:, 4] = 1.7 * rows[:, 4]  # less than what is refused as °F
+    np.savetxt(path, rows, "%.4f", ",", header=path.read_text().splitlines()[0], comments="")
+    reader.read_trips(short_trips / "manifest.csv", load_config(CONFIG), "front")
+    said = capsys.readouterr().err
+    assert re.search(r"trip 2: the same work heats its disc 1\.[5-9] times as much", said)
+    assert said.count("heats its disc") == 1
 
 
 def test_trips_with_a_file_of_columns_give_the_same_model(trips):

@@ -5,6 +5,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+import pytest
 
 from brakelab.identify.friction.choice import Identified, Judged
 from brakelab.identify.friction.columns import Columns
@@ -27,7 +28,7 @@ def test_the_page_of_a_constant(tmp_path: Path, columns: Columns, stops: Stops) 
     assert "1 &lt; 2" in page
     assert not re.search(r"<script|src=|href=|url\(", page)
     charts = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
-    assert [chart.count("<rect x=") for chart in charts] == [2, 4, 3]
+    assert [chart.count("<rect x=") for chart in charts] == [2, 4, 1, 3]
     titles = [int(number) for number in re.findall(r"stop (\d+): ", charts[1])]
     off = [np.mean((law.mu - stops.mu[stops.block_stop == k - 1]) ** 2) for k in titles]
     assert off == sorted(off)
@@ -35,7 +36,9 @@ def test_the_page_of_a_constant(tmp_path: Path, columns: Columns, stops: Stops) 
     assert (off[0], off[-1]) == (min(every), max(every))
     for each in charts:
         ElementTree.fromstring(each)
-    assert page.count('<div class="scroll" tabindex="0"><svg') == 3  # legible on a phone
+    assert page.count('<div class="scroll" tabindex="0"><svg') == 4  # legible on a phone
     assert '<meta name="viewport" content="width=device-width' in page
     assert "prefers-color-scheme:dark" in page
+    level = float(re.search(r"κ of \(3\.12\): (0\.\d+) ± 0\.\d+ at 100 °C", page).group(1))
+    assert level == pytest.approx(stops.mu[np.unique(stops.block_stop, return_index=True)[1]].mean(), rel=0.1)
     assert charts[0].count("h0") == 3 * len(stops)

@@ -46,7 +46,7 @@ def test_a_programme_becomes_a_configuration_and_a_page(blocks, capsys):
     assert 0.05 < middle < 0.3  # g/MJ, as Table 7.1
     page = (blocks / "car.md").read_text()
     assert all(name in page for name in ("town-calm", "motorway-lively", "γ10", "quasi-static"))
-    assert (blocks / "car.svg").is_file()
+    assert "K " in (blocks / "car.svg").read_text("utf-8")  # Figures 7.7 and 7.8
     assert "4 blocks" in capsys.readouterr().out
 
 

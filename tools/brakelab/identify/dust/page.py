@@ -1,4 +1,4 @@
-"""Page of an identification of dust: trips (Table 8.1), models by Table 8.3, Figures 8.2, 8.6 and 8.8."""
+"""Page of an identification of dust: trips (Table 8.1), models by Table 8.3, Figures 8.2 and 8.4 to 8.8."""
 
 from pathlib import Path
 from typing import Final
@@ -8,11 +8,14 @@ import numpy as np
 from brakelab.arrays import Array
 from brakelab.identify.dust.features import Applications
 from brakelab.identify.dust.fit import Judged, spearman
-from brakelab.identify.dust.model import LEAST_PARTICLES
-from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Line, Panel, write_chart
+from brakelab.identify.dust.model import LEAST_PARTICLES, resample, samples_of
+from brakelab.results.chart import BLUE, GREY, ORANGE, PINK, Cells, Line, Panel, write_chart
 from brakelab.results.text_table import Table, markdown
+from ecu.contract.dust import FEATURES
 
 LEGEND: Final = (("chosen", BLUE), ("others", ORANGE), ("95 %, and the background's line", PINK))
+CELLS: Final = 25  # edges of the map's cells, in each direction
+CLASS: Final = 0.25  # of EF
 THESIS: Final = {"LUT": -32.68, "static ANN": -9.07, "dynamic ANN": -3.95}
 """%, sum of particles of Trip 8, Table 8.2."""
 
@@ -111,7 +114,7 @@ def _beside(ends: tuple[float, float], less: float, colour: str) -> Line:
 
 
 def dust_panels(trips: list[Applications], judged: list[Judged], chosen: Judged) -> list[Panel]:
-    """Return Figures 8.2 and 8.8: background by speed, and predicted over counted EF of the tests."""
+    """Return Figures 8.2, 8.8, 8.4 and 8.5: background by speed, predicted over counted EF of the tests."""
     shown = [trip for trip in trips if trip.test] or trips
     first = shown[0].background
     top = 1.3 * float(max(first.levels.max(initial=1.0), first.still))
@@ -123,8 +126,6 @@ def dust_panels(trips: list[Applications], judged: list[Judged], chosen: Judged)
         ])
     ]  # fmt: skip
     for one in judged:
-        if one is not chosen and one.name not in ("LUT", "static ANN"):
-            continue
         counted, said = _pairs(one, shown)
         ends = float(np.floor(min(counted.min(), said.min()))), float(np.ceil(max(counted.max(), said.max())))
         lines = [
@@ -134,13 +135,50 @@ def dust_panels(trips: list[Applications], judged: list[Judged], chosen: Judged)
             _beside(ends, one.above, PINK),
         ]
         panels.append(Panel(f"EF by {one.name}", "EF counted", ends, ends, lines))
-    return panels
+    trained = [trip for trip in trips if not trip.test]
+    table = next(one for one in judged if one.name == "LUT")
+    return [*panels, resampling_panel(trained), map_panel(trained, table)]
+
+
+def map_panel(trips: list[Applications], table: Judged) -> Panel:
+    """Return the EF of the table over speed and pressure, beside the counted applications (Figure 8.5)."""
+    features = np.concatenate([trip.features for trip in trips])
+    speeds, pressures = features[:, FEATURES.index("v_in")], features[:, FEATURES.index("pressure")]
+    x, y = (np.linspace(0.0, float(np.quantile(values, 0.99)), CELLS) for values in (speeds, pressures))
+    grid = np.zeros((CELLS - 1, CELLS - 1, len(FEATURES)))
+    grid[..., FEATURES.index("v_in")] = 0.5 * (x[1:] + x[:-1])
+    grid[..., FEATURES.index("pressure")] = 0.5 * (y[1:] + y[:-1])[:, None]
+    value = table.model.predict(grid.reshape(-1, len(FEATURES)), np.empty(0)).reshape(CELLS - 1, CELLS - 1)
+    low, high = float(value.min()), float(value.max())
+    title = f"EF by LUT, {low:.1f} to {high:.1f} (dark), 2σ {2.0 * table.left_out_rms:.1f}; pressure [bar]"
+    inside = (speeds <= x[-1]) & (pressures <= y[-1])
+    dots = Line(speeds[inside], pressures[inside], ORANGE, marks=True)
+    ends = ((0.0, float(x[-1])), (0.0, float(y[-1])))
+    return Panel(title, "speed before [m/s]", *ends, [dots], cells=Cells(x, y, value, low, high))
+
+
+def resampling_panel(trips: list[Applications]) -> Panel:
+    """Return how frequent each EF is, as counted and as networks are trained (Figure 8.4)."""
+    factor = samples_of(trips).factor
+    edges = np.arange(np.floor(factor.min()), np.ceil(factor.max()) + CLASS, CLASS)
+    shares = [
+        100.0 * np.histogram(values, edges)[0] / len(values)
+        for values in (factor, factor[resample(factor, 0)])
+    ]
+    lines = [
+        Line(np.repeat(edges, 2)[1:-1], np.repeat(share, 2), colour)
+        for share, colour in zip(shares, (GREY, BLUE), strict=True)
+    ]
+    top = 1.1 * float(max(share.max() for share in shares))
+    title = "applications [%], as counted grey, resampled blue"
+    return Panel(title, "EF", (float(edges[0]), float(edges[-1])), (0.0, top), lines)
 
 
 def write_page(page: Path, trips: list[Applications], judged: list[Judged], chosen: Judged) -> None:
-    """Write the tables with Figures 8.2 and 8.8 above them."""
+    """Write the tables with Figures 8.2, 8.4, 8.5 and 8.8 above them."""
     picture = page.with_suffix(".svg")
     write_chart(picture, dust_panels(trips, judged, chosen), LEGEND)
     tables = [model_table(judged, chosen), trip_table(trips), spearman_table(trips)]
-    head = f"# Emission of one brake by {len(trips)} trips\n\n![Figures 8.2 and 8.8]({picture.name})\n\n"
+    figures = f"![Figures 8.2, 8.8, 8.4 and 8.5]({picture.name})"
+    head = f"# Emission of one brake by {len(trips)} trips\n\n{figures}\n\n"
     page.write_text(head + "\n".join(map(markdown, tables)).rstrip() + "\n", encoding="utf-8")

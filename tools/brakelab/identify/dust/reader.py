@@ -22,7 +22,7 @@ from brakelab.identify.dust.features import (
     Recorded,
     extract,
 )
-from brakelab.identify.friction.check import refuse_units
+from brakelab.identify.friction.check import numbers_of, refuse_units
 from brakelab.identify.friction.columns import Columns, load_columns
 from brakelab.identify.friction.reader import in_si
 from brakelab.identify.friction.recording import Recording
@@ -30,6 +30,7 @@ from brakelab.identify.measurement_files import check_celsius, read_columns, rea
 from brakelab.identify.units import COUNTED
 from brakelab.stretches import stretches
 from ecu.errors import UserError
+from ecu.output import say
 from ecu.settings.config import Config
 
 CORNER: Final = "fr"
@@ -47,6 +48,7 @@ IN_ORDER: Final = (COLUMNS[0], COLUMNS[2], COLUMNS[3], COLUMNS[1], COLUMNS[4])
 LONGEST_GAP: Final = 5.0  # s between two samples
 FEWEST_TRIPS: Final = 3  # for identification: each is left out once
 FEWEST_APPLICATIONS: Final = 20  # applications of a trip
+UNLIKE: Final = 1.5  # times the heating of the others: rain and wind make a fifth, °F 1.8
 HIGHEST_SPEED: Final = 90.0  # m/s
 HIGHEST_TEMPERATURE: Final = 900.0  # degC
 MOST_COUNT: Final = 1e6  # 1/cm^3; a street has 1e3 to 1e5
@@ -62,7 +64,7 @@ def read_trips(manifest: Path, config: Config, axle: str, given: Path | None = N
     Raises:
         UserError: a file, a row or a value of it is invalid.
     """
-    trips = []
+    trips, heating = [], []
     columns = trip_columns(config, axle, given)
     for line, row in read_manifest(manifest):
         if not row.get("trip") or not row.get("file") or row.get("test") not in ("0", "1"):
@@ -76,9 +78,16 @@ def read_trips(manifest: Path, config: Config, axle: str, given: Path | None = N
         if found.particles.sum() <= 0.0:
             raise UserError(str(path), "particle_concentration", "does not rise when the brake is applied")
         trips.append(found)
+        heating.append(numbers_of(_applications(trip, columns), columns).heating)
     if sum(not trip.test for trip in trips) < FEWEST_TRIPS:
         remedy = f"give {FEWEST_TRIPS} or more trips with test 0: each is left out once"
         raise UserError(str(manifest), "test", remedy)
+    for one, off in zip(trips, np.array(heating) / np.median(heating), strict=True):
+        if not 1.0 / UNLIKE < off < UNLIKE:
+            say(
+                f"{manifest}: trip {one.trip}: the same work heats its disc {off:.1f} times as much as in "
+                "the other trips; check units and scales of temperature, torque and speed"
+            )
     return trips
 
 
@@ -134,8 +143,13 @@ def _read(path: Path, described: Columns) -> dict[str, Array]:
 
 def _check_units(path: Path, trip: Recorded, columns: Columns) -> None:
     """Refuse a brake's columns in other units than they should have."""
+    if applications := _applications(trip, columns):
+        refuse_units(applications, columns, str(path))
+
+
+def _applications(trip: Recorded, columns: Columns) -> list[Recording]:
     pressed = stretches((trip.pressure > PRESSED) & (trip.speed > MOVING))
-    applications = [
+    return [
         Recording(
             trip.t[begin:end],
             1e5 * (trip.pressure[begin:end] + columns.rig.push_out_pressure),
@@ -146,8 +160,6 @@ def _check_units(path: Path, trip: Recorded, columns: Columns) -> None:
         for begin, end in pressed
         if (end - begin) * PERIOD >= SHORTEST_APPLICATION
     ]
-    if applications:
-        refuse_units(applications, columns, str(path))
 
 
 def on_grid(path: Path, name: str, t: Array, values: Array, grid: Array) -> Array:

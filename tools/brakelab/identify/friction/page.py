@@ -18,6 +18,8 @@ from brakelab.results.text_table import Table
 
 MOST_POINTS: Final = 1500  # points of a chart
 PARTS: Final = 12  # of a running mean
+FIRST: Final = 3  # blocks of 50 ms that are the first contact
+WARM: Final = 100.0  # °C
 
 
 def write_report(
@@ -61,6 +63,7 @@ def write_report(
             ("pressure [bar]", 1e-5 * stops.pressure[stops.block_first]),
         )
     ]
+    adhesion, kappa = _adhesion(stops)
     low, high = identified.temperature
     ends = (
         f"{low:.0f} to {high:.0f} °C, {1e-5 * identified.pressure[0]:.0f} to "
@@ -80,12 +83,37 @@ def write_report(
         "<h2>Friction over time</h2><p>From the stop that the law explains best to that which it explains "
         "worst.</p>",
         scrolling(chart_svg(within, [("measured", GREY), ("law", BLUE)])),
+        "<h2>First contact</h2><p>Friction of the first blocks of every stop over the disc's temperature, "
+        f"κ of (3.12): {kappa}.</p>",
+        scrolling(chart_svg([adhesion], [("stops", GREY), ("κ", BLUE)])),
         "<h2>What the law leaves</h2><p>A mark is a block of 50 ms, the line their mean. A line off zero is "
         "what the law has no term for.</p>",
         scrolling(chart_svg(left, [("blocks", BLUE), ("their mean", ORANGE)])),
         *(html_of(table) for table in tables),
     ]
     write_sheet(path, f"Friction law of {columns.name}", body)
+
+
+def _adhesion(stops: Stops) -> tuple[Panel, str]:
+    """Return friction at first contact over the disc's temperature (Figure 3.10), and its straight line."""
+    begins, counts = np.unique(stops.block_stop, return_index=True, return_counts=True)[1:]
+    first = np.array(
+        [stops.mu[at : at + min(FIRST, count)].mean() for at, count in zip(begins, counts, strict=True)]
+    )
+    heat = stops.start_temperature[stops.block_stop[begins]]
+    (slope, level), covariance = np.polyfit(heat - WARM, first, 1, cov="unscaled")
+    off = first - level - slope * (heat - WARM)
+    sigma = np.sqrt(np.diag(covariance) * float(off @ off) / max(len(off) - 2, 1))
+    line = ends_of(heat)
+    lines = [
+        Line(heat, first, GREY, marks=True),
+        Line(np.array(line), level + slope * (np.array(line) - WARM), BLUE),
+    ]
+    said = (
+        f"{level:.3f} ± {1.96 * sigma[1]:.3f} at {WARM:.0f} °C, {1e5 * slope:+.1f} ± {196e3 * sigma[0]:.1f} "
+        "10⁻³ per 100 K"
+    )
+    return Panel("κ", "disc before the stop [°C]", line, ends_of(first), lines), said
 
 
 def _over_time(stops: Stops, law: Vector) -> list[Panel]:

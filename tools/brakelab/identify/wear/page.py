@@ -1,4 +1,4 @@
-"""Page of a wear law: tables, specific wear (Figure 7.9), sensitivity (Figure 7.10), residuals."""
+"""Page of a wear law: tables, specific wear (Figure 7.9), sensitivity (Figure 7.10), residuals, blending."""
 
 from pathlib import Path
 from typing import Final
@@ -110,6 +110,29 @@ def law_panels(blocks: list[Block], mass: Array, fit: Fit, static: Fit, of_brake
         *sensitivity_panels(extended, quasi_static, cool, hot),
         *residual_panels(blocks, mass, fit),
     ]
+
+
+def fusion_panel(blocks: list[Block], fused: Fused) -> list[Panel]:
+    """Return mass over linear wear of the blocks, before and after they are blended, with the line of K."""
+    wear = np.array([block.lost.wear for block in blocks])
+    known = np.isfinite(wear)
+    if not np.isfinite(fused.slope):
+        return []
+    wear, mass, blended = wear[known], np.array([b.lost.mass for b in blocks])[known], fused.mass[known]
+    ends = np.array([0.0, 1.1 * float(wear.max())])
+    top = float(max(1.1 * mass.max(), fused.slope * ends[1]))
+    moved = [
+        Line(np.array([x, y / fused.slope]), np.array([m, y]), GREY)
+        for x, m, y in zip(wear, mass, blended, strict=True)
+    ]
+    lines = [
+        Line(ends, fused.slope * ends, GREY, True),
+        *moved,
+        Line(wear, mass, ORANGE, marks=True),
+        Line(blended / fused.slope, blended, BLUE, marks=True),
+    ]
+    title = f"mass [g], measured orange, blended blue; K {fused.slope:.1f} g/mm"
+    return [Panel(title, "linear wear [mm]", (0.0, float(ends[1])), (0.0, top), lines)]
 
 
 def tables(blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> list[Table]:
@@ -229,10 +252,11 @@ def _beside(blocks: list[Block]) -> list[Table]:
 def write_page(page: Path, blocks: list[Block], fused: Fused, fit: Fit, static: Fit, of_brake: float) -> None:
     """Write the tables and the panels of the law; `of_brake`: mass that one brake slows [kg]."""
     picture = page.with_suffix(".svg")
-    write_chart(picture, law_panels(blocks, fused.mass, fit, static, of_brake), LEGEND)
+    panels = [*law_panels(blocks, fused.mass, fit, static, of_brake), *fusion_panel(blocks, fused)]
+    write_chart(picture, panels, LEGEND)
     parts = [markdown(table) for table in tables(blocks, fused, fit, static)]
     head = (
         f"# Wear law of {len(blocks)} blocks\n\n![Specific wear (Figure 7.9), sensitivity (Figure 7.10), "
-        f"residuals]({picture.name})\n\n"
+        f"residuals, balance and thickness blended (Figures 7.7, 7.8)]({picture.name})\n\n"
     )
     page.write_text(head + "\n".join(parts).rstrip() + "\n", encoding="utf-8")
