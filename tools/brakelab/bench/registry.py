@@ -16,6 +16,7 @@ STUDIES: Final = {
         "recorded": "studies.accuracy.recorded",
         "vehicle": "studies.accuracy.vehicle",
         "tuning": "studies.accuracy.tuning",
+        "figures": "studies.accuracy.figures",
     },
     "control": {
         "compensation": "studies.control.compensation_study",
