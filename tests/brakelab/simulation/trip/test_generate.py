@@ -225,7 +225,10 @@ def truth(path: Path) -> None:
     speed = trip.speed + (trip.speed > 0.0)
     columns = {"t": trip.t, "vehicle_speed": speed, "grade": trip.grade_by_time()}
     for name in DRIVE_COLUMNS[2:]:
-        columns[name] = np.full(len(trip.t), {"bra": 100.0, "whe": -10.0, "dis": 80.0}[name[:3]])
+        level = {"bra": 100.0, "whe": -10.0, "dis": 80.0, "mu_": 0.4, "pad": 1.0}[name[:3]]
+        columns[name] = np.full(len(trip.t), level)
+        if name.startswith("pad"):
+            columns[name] = 0.25e-3 * trip.t  # 0.25 g/MJ of 1 kW
     pq.write_table(pa.table(columns), path)
 
 
@@ -237,6 +240,8 @@ def test_a_drive_is_reported_beside_its_trip(tmp_path: Path, capsys: pytest.Capt
     assert main([str(tmp_path / "d.truth.parquet"), "--svg", str(tmp_path / "d.svg")]) == 0
     said = capsys.readouterr().out
     assert "1.00 m/s at most" in said
+    for line in ("All              front", "Urban            front", "Motorway          rear"):
+        assert f"{line}     0.400      0.000        0.250" in said
     assert said.count("  yes\n") == len(TABLE_1_1)
     assert "disc temperature" in (tmp_path / "d.svg").read_text()
 

@@ -288,6 +288,8 @@ def main(argv: list[str] | None = None) -> int:
         found = brakings(t, speed, -np.gradient(speed, t))
         lines += [*trip_report.trip_lines(t, speed, grade, found), ""]
         lines += [*trip_report.part_lines(t, speed, discs, found), ""]
+        if arguments.drive is not None:
+            lines += [*trip_report.friction_lines(drive, found), ""]
         print("\n".join([*lines, *trip_report.braking_lines(found)]))
         if arguments.svg is not None:
             write_picture(arguments.svg, t, speed, grade, discs)

@@ -13,8 +13,11 @@ DRIVE_COLUMNS: Final = (
     "vehicle_speed",
     "grade",
     *(f"{stem}_{c}" for stem in ("brake_torque", "wheel_speed", "disc_temperature") for c in CORNERS),
+    *(f"{stem}_{c}" for stem in ("mu_b", "pad_wear_mass") for c in CORNERS),
 )
 """Columns of the truth that `brake_lines` and the tables need."""
+ROADS: Final = (("Urban", -np.inf, URBAN), ("Rural", URBAN, RURAL), ("Motorway", RURAL, np.inf))
+"""m/s, of the speed before an application."""
 BIN: Final = 0.5  # m/s^2, of the histogram
 
 
@@ -71,7 +74,7 @@ def part_lines(t: Array, speed: Array, discs: Array, found: Brakings) -> list[st
     if discs.size:
         lines[0] += "  discs before, front and rear [degC]"
     metres = np.diff(distance_driven(t, speed))
-    for name, low, high in (("Urban", -np.inf, URBAN), ("Rural", URBAN, RURAL), ("Motorway", RURAL, np.inf)):
+    for name, low, high in ROADS:
         here = (found.speed_in > low) & (found.speed_in <= high)
         kilometres = metres[(speed[1:] > low) & (speed[1:] <= high)].sum() / 1e3
         if kilometres == 0.0:
@@ -103,6 +106,35 @@ def follow_line(t: Array, speed: Array, trip_t: Array, trip_speed: Array) -> str
         f"Speed error {np.sqrt(np.mean(error**2)):.2f} m/s rms, {np.abs(error).max():.2f} m/s at most; "
         f"distance {away:+.0f} m"
     )
+
+
+def friction_lines(drive: DriveResult, found: Brakings) -> list[str]:
+    """Return friction of the applications of each axle, and wear over work, by road.
+
+    After Table 1.2, Figures 1.3c and 7.4b. An application's friction is its mean over time, of both wheels.
+    """
+    power = drive.corners("brake_torque") * np.abs(drive.corners("wheel_speed"))
+    work = np.vstack([np.zeros(4), np.cumsum(np.diff(drive.t)[:, None] * power[1:], axis=0)])
+    begins, ends = (np.searchsorted(drive.t, when) for when in (found.start, found.start + found.duration))
+    ends = np.minimum(np.maximum(ends, begins + 1), len(drive.t) - 1)
+    pairs = list(zip(begins, ends, strict=True))
+    friction = drive.corners("mu_b")
+    mean = np.array([friction[begin:end].mean(axis=0) for begin, end in pairs]).reshape(-1, 4)
+    worn, done = (
+        np.array([values[end] - values[begin] for begin, end in pairs]).reshape(-1, 4)
+        for values in (drive.corners("pad_wear_mass"), 1e-6 * work)
+    )
+    lines = [f"{'Brakings':16}{'axle':>6}{'friction':>10}{'deviation':>11}{'wear [g/MJ]':>13}"]
+    for name, low, high in (("All", -np.inf, np.inf), *ROADS):
+        here = (found.speed_in > low) & (found.speed_in <= high)
+        if not here.any():
+            continue
+        for axle, of in (("front", slice(0, 2)), ("rear", slice(2, 4))):
+            level, rate = mean[here, of], worn[here, of].sum() / max(done[here, of].sum(), 1e-9)
+            lines.append(
+                f"{name:16}{axle:>6}{level.mean():10.3f}{level.mean(axis=1).std():11.3f}{rate:13.3f}"
+            )
+    return lines
 
 
 def brake_lines(drive: DriveResult) -> list[str]:
