@@ -28,9 +28,11 @@ from brakelab.studies.accuracy.observers import (
 from brakelab.studies.accuracy.observers_cases import (
     ACCURACY,
     CASES,
+    DRY_FALL,
     EVENTS,
     LONGEST_EFFECT,
     ROBUSTNESS,
+    TRANSDUCERS,
     WRONG_START,
     Setup,
     configured,
@@ -131,6 +133,17 @@ def test_every_case_is_driven_by_whom_it_is_for() -> None:
     for name in ROBUSTNESS:
         assert sorted(driven[name, JOINT]) == [0, 1]  # of either sign
         assert (name, "observer2") not in driven
+    for name in TRANSDUCERS:
+        assert {observer for one, observer in driven if one == name} == {"observer1"}
+
+
+def test_a_tyre_of_another_form_is_one() -> None:
+    case = ROBUSTNESS["tyre of another form (Burckhardt)"]
+    stop = Setup(case.scenario.model_copy(update={"phase": case.scenario.phase[:1]}), configured())
+    setup = case.change(stop, 1.0)
+    magic, burckhardt = (drive_car(one, JOINT, 0)[0].truth["slip_rl"] for one in (stop, setup))
+    assert not np.array_equal(magic, burckhardt)
+    assert setup.form == (("burckhardt_fall", DRY_FALL),)
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from brakelab.studies.accuracy.observers_cases import (
     EVENTS,
     ROBUSTNESS,
     SENSORS,
+    TRANSDUCERS,
     WRONG_START,
     Case,
     Setup,
@@ -104,6 +105,8 @@ def drive_car(
     sides = loop.sides
     for name, factors in setup.car:
         sides.vehicle.params[name][0] *= factors
+    for name, value in setup.form:
+        sides.vehicle.params[name] = value
     if setup.any_rate:
         sides.ecu_reception.freshness[:] = freshness_at_any_rate()
     if learned is not None:
@@ -209,9 +212,9 @@ def tasks(seeds: int, draw: str = WIDE) -> list[Task]:
     lasting = tuple(name for name, case in few.items() if case.lasting)
     robust = range(max(seeds // ROBUST_SHARE, 1))
     alone = [Task(JOINT, seed, lasting, draw) for seed in robust]
-    common = (*ACCURACY, *EVENTS)
+    own = {JOINT: passing, "observer1": tuple(TRANSDUCERS)}
     return alone + [
-        Task(observer, seed, (*common, *(passing if observer == JOINT and seed in robust else ())), draw)
+        Task(observer, seed, (*ACCURACY, *EVENTS, *(own.get(observer, ()) if seed in robust else ())), draw)
         for observer in OBSERVERS
         for seed in range(seeds)
     ]

@@ -19,6 +19,9 @@ EVERY_SENSOR: Final = (
     *("accel_x", "accel_y", "yaw_rate", "vehicle_speed"),
     *("wheel_speed", "calliper_pressure", "motor_torque", "steering_angle"),
 )
+CROSSTALK: Final = 0.01  # of a measuring wheel (Table D.2)
+NONLINEAR: Final = 0.005 * 35e3  # N, 0.5 % of its range; of each wheel
+DRY_FALL: Final = 0.4  # c_3 / c_1 of Burckhardt's tyre on dry asphalt, 0.52 / 1.28
 GAP, BETWEEN_GAPS = 0.180, 2.0  # s, means
 LASTING: Final = 0.5  # s, of a motor torque's error that is not white
 LOST_IN_GAPS: Final = GAP / (GAP + BETWEEN_GAPS)
@@ -33,6 +36,8 @@ class Setup(NamedTuple):
     config: Config
     car: tuple[tuple[str, tuple[float, ...]], ...] = ()
     """Parameters of the drawn car and factors upon them per wheel."""
+    form: tuple[tuple[str, float], ...] = ()
+    """Parameters of the drawn car that are set: another law than that of its file."""
     any_rate: bool = False
     """The ECU expects inputs at any rate."""
 
@@ -161,6 +166,10 @@ def _radii(setup: Setup, sign: float) -> Setup:
     return setup._replace(car=(("free_radius", (1.0 + share, 1.0 + share, 1.0 - share, 1.0 - share)),))
 
 
+def _burckhardt(setup: Setup, sign: float) -> Setup:
+    return setup._replace(form=(("burckhardt_fall", DRY_FALL),))
+
+
 def _unequal(setup: Setup, sign: float) -> Setup:
     left, right = 1.0 + 0.1 * sign, 1.0 - 0.1 * sign
     return setup._replace(car=(("friction_scale", (left, right, left, right)),))
@@ -172,6 +181,7 @@ def _robustness() -> dict[str, Case]:
         "mass ±10 %": _changed(vehicle__mass=0.1),
         "rolling radius ±0.5 %, rear ∓": _radii,
         "tyre stiffness ±30 %": _changed(front__slip_stiffness=0.3, rear__slip_stiffness=0.3),
+        "tyre of another form (Burckhardt)": _burckhardt,
         "pressure offset ±1 bar": _sensing(
             lambda sign: {"calliper_pressure": SensorErrors(bias=(sign, sign))}
         ),
@@ -304,4 +314,15 @@ EVENTS: Final = {
 """Drives whose times are reported."""
 LONGEST_EFFECT: Final = {"tyre stiffness × 0.67": 0.10, "low-grip patch": 0.30}
 """How long their events may be felt [s]: as in the thesis, read off Figures 4.11 and 5.5."""
-CASES: Final = ACCURACY | ROBUSTNESS | SENSORS | EVENTS
+TRANSDUCERS: Final = {
+    "stop #1, transducers as Table D.2": Case(
+        shipped("stop-1"),
+        change=_sensing(
+            lambda sign: {
+                "wheel_force_x": SensorErrors(scale=1.0 + CROSSTALK * sign, bias=(-NONLINEAR, NONLINEAR))
+            }
+        ),
+    )
+}
+"""Drives of Observer 1."""
+CASES: Final = ACCURACY | ROBUSTNESS | SENSORS | EVENTS | TRANSDUCERS
