@@ -5,9 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from brakelab.plant.description import read_file
+from brakelab.plant.linings import Linings
 from brakelab.results.chart import write_chart
 from brakelab.studies.accuracy import figures
 from brakelab.studies.accuracy.figures import BEFORE, Shown, _driven, _error_row, _rows, error_of, panels
+from brakelab.studies.physics.heat import heat_panels
+from ecu.settings.resources import resource
 
 
 def test_a_drive_is_drawn_from_before_its_braking_and_counted(tmp_path: Path) -> None:
@@ -32,6 +36,16 @@ def test_of_several_stops_the_last_is_drawn() -> None:
     rows = np.flatnonzero(_rows(drive))
     assert 0.01 * len(rows) < 30.0
     assert drive.truth["vehicle_speed"][rows[0]] == pytest.approx(27.8, abs=0.5)
+
+
+def test_the_disc_cools_the_faster_the_more_the_speed_counts() -> None:
+    drawn = heat_panels(read_file(resource("config/plant/linings.toml"), Linings))
+    assert [panel.title[:4].strip() for panel in drawn] == ["3.6b", "3.7", "3.7", "3.8", "3.8"]
+    for panel in drawn[1:]:
+        conventional, plant, printed = (line.y[-1] for line in panel.lines)
+        assert conventional > plant > printed
+    slow, fast = (panel.lines[0].y[-1] - panel.lines[2].y[-1] for panel in drawn[1:3])
+    assert fast > slow
 
 
 @pytest.mark.parametrize("wrong", [-0.2, 0.2])

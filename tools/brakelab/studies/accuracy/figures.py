@@ -1,4 +1,4 @@
-"""`brake-ecu bench figures`: manoeuvres of chapters 1, 4, 5 and 6 drawn over time, with one drawn car."""
+"""`brake-ecu bench figures`: what chapters 1, 3, 4, 5 and 6 draw over time, with one drawn car."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,12 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
+from brakelab.plant.description import read_file
+from brakelab.plant.linings import Linings
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel, write_chart
 from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.accuracy import AXLES, LOWEST_SPEED, achieved_decel, columns, nrmse, window
 from brakelab.simulation.closed_loop import Drive, FrictionOverride, new_loop, run
 from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.studies.physics.heat import heat_panels
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import load_config
@@ -21,6 +24,7 @@ from ecu.settings.resources import resource
 
 CAR: Final = 0
 LEGEND: Final = [("true", GREY), ("estimate, front", BLUE), ("estimate, rear", ORANGE)]
+DISC: Final = [("delta_1 = 0", GREY), ("as the plant has it", BLUE), ("as printed", ORANGE)]
 COLOURS: Final = dict(zip(AXLES, (BLUE, ORANGE), strict=True))
 SHARES: Final = {0: GREY, 20: GREEN, 40: BLUE, 60: ORANGE, 80: PINK}
 ERRORS: Final = tuple(round(0.1 * step, 1) for step in range(-3, 4))
@@ -158,12 +162,13 @@ def _error_row(shown: Shown, drive: Drive, decel: Vector) -> tuple[str, ...]:
 
 
 TEXT: Final = (
-    "What the thesis draws over time in chapters 1, 4, 5 and 6, with drawn car 0 of config/plant/suv.toml "
+    "What the thesis draws over time in chapters 1, 3, 4, 5 and 6, with drawn car 0 of config/plant/suv.toml "
     "(wide) and the ECU of config/suv.toml, which has learned nothing before. Accuracy over many cars: "
     "[observers.md](observers.md), [compensation.md](compensation.md).\n\n"
     "![Figures 4.8 to 4.10](images/figures-stops.svg)\n\n![Figure 4.6](images/figures-loads.svg)\n\n"
     "![Figures 5.4 to 5.6](images/figures-blending.svg)\n\n"
     "![Figures 6.1 and 6.2](images/figures-pedal.svg)\n\n![Figure 1.5](images/figures-error.svg)\n\n"
+    "![Figures 3.6b, 3.7 and 3.8](images/figures-disc.svg)\n\n"
     "The mean of an axle is drawn, in 4.6 each wheel. Figure 1.5: the controller uses a friction that is "
     "wrong by so much in stop #1; dashed: 1 / (1 + error)."
 )
@@ -174,6 +179,7 @@ def _run(asked: Asked) -> Measured:
     drives = dict(zip(every, run_each("figures", _driven, every), strict=True))
     shares = run_each("shares", _driven, [Shown("5.6", f"blending-{share}", ()) for share in SHARES])
     off = run_each("errors", error_of, ERRORS)
+    linings = read_file(resource("config/plant/linings.toml"), Linings)
 
     def draw(folder: Path) -> None:
         for name, group in PICTURES.items():
@@ -181,6 +187,7 @@ def _run(asked: Asked) -> Measured:
             if name == "blending":
                 found += blended({share: drive for share, (drive, _) in zip(SHARES, shares, strict=True)})
             write_chart(folder / f"figures-{name}.svg", found, LEGEND, 3 if name == "loads" else 5)
+        write_chart(folder / "figures-disc.svg", heat_panels(linings), DISC, 5)
         x = 100.0 * np.array(ERRORS)
         lines = [Line(x, np.array(off), BLUE), Line(x, 100.0 / (1.0 + np.array(ERRORS)) - 100.0, GREY, True)]
         title = "1.5: error of the deceleration [%]"
