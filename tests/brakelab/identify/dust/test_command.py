@@ -66,6 +66,7 @@ def test_trips_become_a_configuration_and_a_page(trips, capsys):
     drawn = (trips / "car.svg").read_text("utf-8")
     assert all(f"EF by {name}" in drawn for name in ("LUT, ", "dynamic ANN", "monotone law"))
     assert "resampled" in drawn
+    assert "trip 4: counter" in drawn  # Figure 8.3
     assert "from 3 trips" in capsys.readouterr().out
 
 

@@ -95,6 +95,7 @@ class Applications(NamedTuple):
     background: Background
     delay_s: float
     """s of the air from disc to counter"""
+    recorded: Recorded | None = None
 
     @property
     def factor(self) -> Array:
@@ -242,4 +243,5 @@ def extract(trip: Recorded, radius: float) -> Applications:
         (features[:, 0] - features[:, 1]) / features[:, 4],
         background,
         delay,
+        trip,
     )

@@ -1,4 +1,4 @@
-"""Page of an identification of dust: trips (Table 8.1), models by Table 8.3, Figures 8.2 and 8.4 to 8.8."""
+"""Page of an identification of dust: trips (Table 8.1), models by Table 8.3, Figures 8.2 to 8.8."""
 
 from pathlib import Path
 from typing import Final
@@ -15,6 +15,7 @@ from ecu.contract.dust import FEATURES
 
 LEGEND: Final = (("chosen", BLUE), ("others", ORANGE), ("95 %, and the background's line", PINK))
 CELLS: Final = 25  # edges of the map's cells, in each direction
+SHOWN_S: Final = 300.0  # of a trip
 CLASS: Final = 0.25  # of EF
 THESIS: Final = {"LUT": -32.68, "static ANN": -9.07, "dynamic ANN": -3.95}
 """%, sum of particles of Trip 8, Table 8.2."""
@@ -114,7 +115,7 @@ def _beside(ends: tuple[float, float], less: float, colour: str) -> Line:
 
 
 def dust_panels(trips: list[Applications], judged: list[Judged], chosen: Judged) -> list[Panel]:
-    """Return Figures 8.2, 8.8, 8.4 and 8.5: background by speed, predicted over counted EF of the tests."""
+    """Return Figures 8.2, 8.8, 8.4, 8.5 and 8.3: background by speed, predicted over counted EF, the map."""
     shown = [trip for trip in trips if trip.test] or trips
     first = shown[0].background
     top = 1.3 * float(max(first.levels.max(initial=1.0), first.still))
@@ -137,7 +138,7 @@ def dust_panels(trips: list[Applications], judged: list[Judged], chosen: Judged)
         panels.append(Panel(f"EF by {one.name}", "EF counted", ends, ends, lines))
     trained = [trip for trip in trips if not trip.test]
     table = next(one for one in judged if one.name == "LUT")
-    return [*panels, resampling_panel(trained), map_panel(trained, table)]
+    return [*panels, resampling_panel(trained), map_panel(trained, table), *extraction_panels(shown[0])]
 
 
 def map_panel(trips: list[Applications], table: Judged) -> Panel:
@@ -155,6 +156,36 @@ def map_panel(trips: list[Applications], table: Judged) -> Panel:
     dots = Line(speeds[inside], pressures[inside], ORANGE, marks=True)
     ends = ((0.0, float(x[-1])), (0.0, float(y[-1])))
     return Panel(title, "speed before [m/s]", *ends, [dots], cells=Cells(x, y, value, low, high))
+
+
+def extraction_panels(trip: Applications) -> list[Panel]:
+    """Return some minutes of a trip with its applications and their means (Figure 8.3)."""
+    of = trip.recorded
+    if of is None or len(trip.start) == 0:
+        return []
+    begin = float(trip.start[len(trip.start) // 2]) - 0.5 * SHOWN_S
+    rows = (of.t >= begin) & (of.t < begin + SHOWN_S)
+    t, means = of.t[rows], (trip.start >= begin) & (trip.start < begin + SHOWN_S)
+    ends = trip.start + trip.features[:, FEATURES.index("duration")]
+    braked = [(t >= start) & (t <= end) for start, end in zip(trip.start[means], ends[means], strict=True)]
+    found = []
+    for title, values, feature in (
+        ("speed [m/s]", of.speed, ""),
+        ("pressure [bar]", of.pressure, "pressure"),
+        ("torque [N m]", of.torque, "torque"),
+        ("disc [°C]", of.temperature, "temperature"),
+        ("counter [1/cm³]", of.concentration, ""),
+    ):
+        shown = values[rows]
+        lines = [Line(t, shown, GREY), *(Line(t[part], shown[part], ORANGE) for part in braked)]
+        if feature:
+            middle = 0.5 * (trip.start + ends)[means]
+            lines.append(Line(middle, trip.features[means, FEATURES.index(feature)], BLUE, marks=True))
+        low, high = float(shown.min()), float(shown.max())
+        margin = 0.05 * max(high - low, 1e-9)
+        span = (low - margin, high + margin)
+        found.append(Panel(f"{trip.trip}: {title}", "t [s]", (begin, begin + SHOWN_S), span, lines))
+    return found
 
 
 def resampling_panel(trips: list[Applications]) -> Panel:
@@ -179,6 +210,6 @@ def write_page(page: Path, trips: list[Applications], judged: list[Judged], chos
     picture = page.with_suffix(".svg")
     write_chart(picture, dust_panels(trips, judged, chosen), LEGEND)
     tables = [model_table(judged, chosen), trip_table(trips), spearman_table(trips)]
-    figures = f"![Figures 8.2, 8.8, 8.4 and 8.5]({picture.name})"
+    figures = f"![Figures 8.2, 8.8, 8.4, 8.5 and 8.3]({picture.name})"
     head = f"# Emission of one brake by {len(trips)} trips\n\n{figures}\n\n"
     page.write_text(head + "\n".join(map(markdown, tables)).rstrip() + "\n", encoding="utf-8")
