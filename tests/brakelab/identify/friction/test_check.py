@@ -54,6 +54,12 @@ def test_a_temperature_is_doubted_by_what_the_energy_heats(
     assert remedy in str(error.value)
 
 
+def test_a_thermocouple_that_shows_nothing_is_named(recording: Recording, columns: Columns) -> None:
+    still = recording._replace(temperature=0.0 * recording.temperature + 25.0)
+    with pytest.raises(UserError, match="temperature: does not change; give the column of the disc's"):
+        refuse_nonsense(still, columns, "DATA")
+
+
 def test_kelvin_is_no_disc(recording: Recording, columns: Columns) -> None:
     with pytest.raises(UserError, match="no brake disc is that"):
         refuse_nonsense(recording._replace(temperature=recording.temperature + 800.0), columns, "cpc.csv")

@@ -55,6 +55,7 @@ BAD = {
     "air in degF": (lambda one: drive(one._replace(air=1.8 * one.air + 62.0)), "below the air"),
     "saturated": (lambda one: reading(one, lambda x: np.minimum(x, np.percentile(x, 70))), "saturated"),
     "pyrometer": (lambda one: reading(one, lambda x: np.maximum(x, np.percentile(x, 50))), "range begins"),
+    "one of two in degF": (lambda one: reading(one, lambda x: 1.8 * x + 32.0), "fl: rises and falls 1.*F"),
     "cold disc": (lambda one: reading(one, lambda x: 20.0 + 0.05 * x), "brake harder"),
 }  # fmt: skip
 

@@ -157,6 +157,8 @@ def refuse_nonsense(recording: Recording, columns: Columns, where: str) -> Numbe
         raise UserError(where, f"time, {between:.3g} s between samples", "check its unit; 50 Hz are needed")
     if np.ptp(recording.speed) < 1e-3:
         raise UserError(where, "speed", "does not change; give the column of the disc's speed")
+    if np.ptp(recording.temperature) < STILL:
+        raise UserError(where, "temperature", "does not change; give the column of the disc's thermocouple")
     numbers, _ = measure(recording, columns, where)
     mistake = likeliest(numbers, columns)
     if mistake is not None:

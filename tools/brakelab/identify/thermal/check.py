@@ -22,6 +22,7 @@ BELOW_AIR: Final = 15.0  # K
 STUCK: Final = 30.0  # s at its highest value, to a thousandth of its range
 STUCK_LOW: Final = 60.0  # s at its lowest, above the air
 SEEN: Final = 0.5  # share of the cycles
+UNLIKE: Final = 1.5  # of the spread of the temperatures of an axle, greater over smaller
 LIKELY: Final = (0.4, 2.5)  # of xi over the configuration's
 BETTER: Final = 0.8  # of the residual, if read in degF
 
@@ -63,7 +64,26 @@ def check_drive(drive: ThermalLog) -> list[int]:
         raise UserError(path, "calliper_pressure_*", remedy)
     for i in corners:
         _check_sensor(path, series, i)
+    for left in (0, 2):
+        if left in corners and left + 1 in corners:
+            _check_alike(path, series, left)
     return corners
+
+
+def _check_alike(path: str, series: Series, left: int) -> None:
+    """Refuse discs of an axle of which one heats and cools far more than the other."""
+    both = np.isfinite(series.measured[:, left : left + 2]).all(axis=1)
+    if np.count_nonzero(both) < LEAST_ROWS:
+        return
+    spread = series.measured[both, left : left + 2].std(axis=0)
+    more, less = (left, left + 1) if spread[0] > spread[1] else (left + 1, left)
+    ratio = float(spread.max() / spread.min())
+    if ratio > UNLIKE:
+        remedy = (
+            f"rises and falls {ratio:.1f} times as much as {CORNERS[less]}: degF? give both in degC, or "
+            "leave the wrong one out"
+        )
+        raise UserError(path, f"disc_temperature_measured_{CORNERS[more]}", remedy)
 
 
 def _check_sensor(path: str, series: Series, corner: int) -> None:
