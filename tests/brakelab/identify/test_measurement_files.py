@@ -94,7 +94,8 @@ def test_a_sample_that_stands_alone_is_left_out_and_said(
 ) -> None:
     torque = 800.0 + 100.0 * np.sin(np.arange(200.0))
     torque[77] = 1e6
-    table = pa.table({"t": 0.1 * np.arange(200), "brake_torque": torque, "particle_concentration": torque})
+    counted = np.where(np.arange(200) == 77, 5e3, torque)  # a plume
+    table = pa.table({"t": 0.1 * np.arange(200), "brake_torque": torque, "particle_concentration": counted})
     pq.write_table(table, tmp_path / "block.parquet")
     names = ("t", "brake_torque", "particle_concentration")
     columns = read_columns(tmp_path / "block.parquet", names, "trip", counts=names[2:])
