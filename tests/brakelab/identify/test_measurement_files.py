@@ -109,6 +109,7 @@ def test_a_sample_that_stands_alone_is_left_out_and_said(
     [
         ("t,omega\n0,80\n0.1,fast\n", "line 3, omega: fast is no number"),
         ("t,omega\n0,80\n0.1\n", "line 3 (1 cell instead of 2): is damaged"),
+        ("Zeit,n\n0,80\n1,79\n", "t: no such column; a block has t, omega, this file Zeit, n; name its own"),
         ("t;omega\ns;furlong\n0;80\n1;79\n2;78\n", "omega: unit 'furlong' unknown; one of rad/s, rpm"),
     ],
 )

@@ -202,10 +202,9 @@ def read_columns(
 
 def _refuse_missing(path: Path, names: tuple[str, ...], found: Sequence[str], what: str) -> None:
     if missing := [name for name in names if name not in found]:
-        remedy = (
-            f"no such column; a {what} has {', '.join(names)}, this file {', '.join(found[:20])}; name its "
-            "own with --columns"
-        )
+        remedy = f"no such column; a {what} has {', '.join(names)}"
+        if len(missing) > 1:  # somebody's own names
+            remedy += f", this file {', '.join(found[:20])}; name its own with --columns"
         raise UserError(str(path), missing[0], remedy)
 
 
