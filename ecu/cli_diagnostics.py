@@ -17,8 +17,8 @@ def diag(
         str,
         typer.Argument(
             metavar="ACTION",
-            autocompletion=known("faults", "clear", "read", "info"),
-            help="faults, clear, read or info",
+            autocompletion=known("faults", "clear", "read", "info", "new-pads", "measured", "forget"),
+            help="faults, clear, read, info, new-pads, measured or forget",
         ),
     ],
     interface: Interface,
@@ -27,7 +27,8 @@ def diag(
         list[str] | None,
         typer.Argument(
             metavar="[NAME]...",
-            help="What to read, as mu_b or 0x0110; what to clear, as C1003-08; default: all",
+            help="What to read, as mu_b or 0x0110; what to clear, as C1003-08; default: all."
+            " Of new-pads: front, rear, all or corners; of measured: fl=9.8 fr=9.7, mm",
         ),
     ] = None,
     ids: Annotated[
@@ -38,11 +39,17 @@ def diag(
             help="Identifiers of the ECU's diagnostics (`run --diagnostics`)",
         ),
     ] = "0x7E0:0x7E8",
+    key: Annotated[
+        Path | None,
+        typer.Option("--key", metavar="FILE", help="Secret for new-pads, measured, forget: that of `run`"),
+    ] = None,
 ) -> int:
-    """Ask an ECU on a bus for its faults and values (UDS). Exit code 1: it has confirmed faults."""
+    """Ask an ECU on a bus for its faults and values, or register new and measured pads (UDS).
+
+    Exit code 1: it has confirmed faults."""
     from ecu.diagnostics import tester
 
-    return tester.diag(action, names or [], interface, channel, ids)
+    return tester.diag(action, names or [], interface, channel, ids, key)
 
 
 @app.command()

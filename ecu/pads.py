@@ -176,8 +176,8 @@ def lines(corners: list[Corner]) -> list[str]:
     return table
 
 
-def parse_measured(text: str) -> dict[int, float]:
-    """Return thicknesses [mm] by corner from "fl=9.8,fr=9.7".
+def parse_measured(text: str, where: str = "--measured") -> dict[int, float]:
+    """Return thicknesses [mm] by corner from "fl=9.8,fr=9.7", given at `where`.
 
     Raises:
         UserError: it is not of that form.
@@ -190,7 +190,7 @@ def parse_measured(text: str) -> dict[int, float]:
         except ValueError:
             thickness = math.nan
         if corner not in CORNERS or not math.isfinite(thickness):
-            raise UserError("--measured", part.strip(), f"give corner=mm, corners {', '.join(CORNERS)}")
+            raise UserError(where, part.strip(), f"give corner=mm, corners {', '.join(CORNERS)}")
         found[CORNERS.index(corner)] = thickness
     return found
 

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Final
 
 import can
@@ -9,9 +10,18 @@ import can
 from ecu.bus.addresses import Addresses, parse_addresses
 from ecu.diagnostics import read_faults
 from ecu.diagnostics.fault_memory import AGEING_CYCLES, CONFIRMED, STATUS_NAMES, TEST_FAILED
-from ecu.diagnostics.identifiers import BY_NAME, BY_NUMBER, TEXTS, UNITS, snapshot_values, to_values
+from ecu.diagnostics.identifiers import (
+    BY_NAME,
+    BY_NUMBER,
+    PAD_THICKNESS,
+    TEXTS,
+    UNITS,
+    snapshot_values,
+    to_values,
+)
 from ecu.diagnostics.services import ALL_GROUPS, CLEAR, NEGATIVE, POSITIVE, READ_DATA, READ_FAULTS
 from ecu.diagnostics.session import P2_STAR_MS, PENDING, REASONS
+from ecu.diagnostics.tester_work import HINTS, WORKS, Ask, do, request_of, secret_of
 from ecu.diagnostics.transport import Link
 from ecu.diagnostics.trouble_codes import BY_NUMBER as CODES
 from ecu.diagnostics.trouble_codes import TROUBLE_CODES, code_text
@@ -22,9 +32,8 @@ PATIENCE_S: Final = 1.0
 """For the first byte of a response; P2 is 50 ms, and transmission in both directions."""
 PATIENCE_PENDING_S: Final = 1e-3 * P2_STAR_MS
 TURN_S: Final = 0.01
-ACTIONS: Final = ("faults", "clear", "read", "info")
-
-Ask = Callable[[bytes], bytes]
+ACTIONS: Final = ("faults", "clear", "read", "info", *WORKS)
+WITHOUT_NAMES: Final = ("faults", "info", "forget")
 
 
 class Tester:
@@ -54,6 +63,8 @@ class Tester:
                 elif heard.data[:2] == bytes([NEGATIVE, request[0]]) and len(heard.data) == 3:
                     code = heard.data[2]
                     reason = REASONS.get(code, f"0x{code:02X}")
+                    hint = HINTS.get((request[0], code))
+                    reason += f": {hint}" if hint else ""
                     raise RunFault(f"service 0x{request[0]:02X} refused: {reason}")
         except (can.CanError, OSError) as error:
             raise RunFault(f"the bus failed: {error}") from None
@@ -64,8 +75,12 @@ class Tester:
         )
 
 
-def diag(action: str, names: Sequence[str], interface: str, channel: str, ids: str) -> int:
+def diag(
+    action: str, names: Sequence[str], interface: str, channel: str, ids: str, key: Path | None = None
+) -> int:
     """Ask the ECU and print what it answers; return 1 if it has confirmed faults.
+
+    `key`: file of the secret that gives access, for what changes the learned values.
 
     Raises:
         UserError: an argument is wrong, or the bus cannot be opened.
@@ -73,9 +88,11 @@ def diag(action: str, names: Sequence[str], interface: str, channel: str, ids: s
     """
     if action not in ACTIONS:
         raise UserError("diag", action, f"not known; take {', '.join(ACTIONS)}{closest(action, ACTIONS)}")
-    if names and action in ("faults", "info"):
+    if names and action in WITHOUT_NAMES:
         raise UserError("diag", names[0], f"{action} takes no name")
     addresses = parse_addresses("--ids", ids)
+    work = request_of(action, names) if action in WORKS else b""
+    secret = secret_of(action, key)
     numbers = [_number(name) for name in names] if action == "read" else []
     codes = [_code(name) for name in names] if action == "clear" else []
     link = Link(interface, channel, addresses.request, addresses.response)
@@ -85,6 +102,11 @@ def diag(action: str, names: Sequence[str], interface: str, channel: str, ids: s
             return _faults(ask)
         if action == "clear":
             return _clear(ask, codes)
+        if work:
+            do(ask, work, secret)
+            print(f"done and stored: {action}")
+            give(done=action)
+            return 0 if action == "forget" else _read(ask, [PAD_THICKNESS.number])
         return _read(ask, list(TEXTS) if action == "info" else numbers or list(BY_NUMBER))
     finally:
         link.close()

@@ -2,19 +2,27 @@
 
 import os
 import random
+import threading
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 
 import can
 import numpy as np
 import pytest
-from udsoncan.exceptions import NegativeResponseException, TimeoutException
+from udsoncan.exceptions import (
+    InvalidResponseException,
+    NegativeResponseException,
+    TimeoutException,
+    UnexpectedResponseException,
+)
 
-from brakelab.testing.daemon import wait_for
+from brakelab.testing.daemon import patience, wait_for
 from ecu.algorithm.step import new_state
 from ecu.contract.work import Kind, Work
+from ecu.diagnostics import tester
 from ecu.diagnostics.identifiers import PAD_THICKNESS
 from ecu.diagnostics.services import FORGET, NEW_PADS
+from ecu.errors import RunFault
 from ecu.recording.recorder import read_recording
 from ecu.recording.store import open_store, restore
 from ecu.settings.config import load_config, new_params, store_key
@@ -34,6 +42,7 @@ WORKS = {
     "measured pads": lambda one: one.write_data_by_identifier(THICKNESS, [None, None, 8.5, None]),
     "forget": lambda one: one.start_routine(FORGET),
 }
+AGAIN = (TimeoutException, UnexpectedResponseException, InvalidResponseException, NegativeResponseException)
 
 
 def foreign_tester(**config):
@@ -88,6 +97,41 @@ def test_refused_on_the_road_done_at_rest_stored_and_replayed_to_the_bit(unit, c
     assert learned["wear"]["told"].tolist() == [[1, 1, 0, 0]]
     assert learned["wear"]["measurements"].tolist() == [[0, 0, 1, 0]]
     assert np.array_equal(learned["mu_b"], new_state(params)["learned"]["mu_b"])
+
+
+def test_two_testers_at_once_do_whole_works_or_none(unit, car, tmp_path, monkeypatch):
+    """Ours and a foreign one on one pair of identifiers: each may take the other's answer, and asks again."""
+    car.set(decel_demand=0)
+    stop(car)
+    monkeypatch.setattr(tester, "PATIENCE_S", 0.3)
+    wanted = {"new_pads": {"fl": 0.0, "fr": 0.0}, "measured_pads": {"rl": 1.5, "rr": 1.5}}
+    rear = CONFIG.rear.pad.thickness_new - 1.5
+    counts = dict.fromkeys(wanted, 0)
+
+    def measure():
+        for _ in patience():
+            with suppress(RunFault):
+                names = [f"rl={rear:g}", f"rr={rear:g}"]
+                tester.diag("measured", names, "udp_multicast", GROUP, "0x7E0:0x7E8", tmp_path / "key")
+                counts["measured_pads"] += 1
+            if min(counts.values()) >= 2:
+                break
+
+    thread = threading.Thread(target=measure)
+    thread.start()
+    with foreign_tester(request_timeout=1, p2_timeout=1) as client:
+        for _ in patience():
+            with suppress(*AGAIN):
+                counts["new_pads"] += done(client, WORKS["new pads"])
+            if min(counts.values()) >= 2:
+                break
+    thread.join(120)
+    unharmed(unit, tmp_path / "record")
+    works = [line for line in unit.seen if line["event"] == "serviced"]
+    assert {line["kind"] for line in works} == set(wanted)
+    assert all(line["wear"] == pytest.approx(wanted[line["kind"]], abs=0.011) for line in works)
+    assert [line["number"] for line in works] == list(range(1, len(works) + 1))
+    assert same_bits(read_recording(tmp_path / "record").folder, tmp_path / "result.parquet") == []
 
 
 def test_a_tester_that_dies_in_the_middle_leaves_all_or_nothing(unit, car, tmp_path):

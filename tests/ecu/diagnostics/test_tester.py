@@ -9,10 +9,12 @@ import pytest
 from ecu import cli
 from ecu.contract.faults import WHEEL_SPEED_LOST
 from ecu.diagnostics import tester as tester_module
-from ecu.diagnostics.identifiers import BY_NAME, BY_NUMBER, TEXTS, snapshot, to_bytes
+from ecu.diagnostics.identifiers import BY_NAME, BY_NUMBER, PAD_THICKNESS, TEXTS, snapshot, to_bytes
 from ecu.diagnostics.transport import Request
 from ecu.diagnostics.trouble_codes import TROUBLE_CODES
 from ecu.recording.ring import RECORDED
+
+from .conftest import SECRET
 
 
 class Wire:
@@ -113,6 +115,55 @@ def test_reading(words, out, diag, ecu):
     assert diag(words, ecu) == (0, out, "")
 
 
+@pytest.fixture
+def key(tmp_path):
+    """A file with the secret of the ECU of the tests."""
+    path = tmp_path / "key"
+    path.write_text(SECRET.hex())
+    path.chmod(0o600)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("words", "done"),
+    [
+        ("new-pads front rl", ("NEW_PADS", {"fl": 0.0, "fr": 0.0, "rl": 0.0})),
+        ("new-pads all", ("NEW_PADS", dict.fromkeys(("fl", "fr", "rl", "rr"), 0.0))),
+        ("measured fl=9.8 rr=7.25", ("MEASURED_PADS", {"fl": 9.8, "rr": 7.25})),
+        ("measured fl=9.8,rr=7.25", ("MEASURED_PADS", {"fl": 9.8, "rr": 7.25})),
+        ("forget", ("FORGET", {})),
+    ],
+)
+def test_work_of_a_workshop(words, done, diag, tester, world, key):
+    world.read = {PAD_THICKNESS.number: b"\x03\xd4" * 4}
+    one = tester()
+    code, out, errors = diag(f"{words} --key {key}", lambda request: [bytes.fromhex(one.ask(request.hex()))])
+    assert (code, errors, world.works) == (0, "", [done])
+    pads = "" if words == "forget" else "pad_thickness 9.8/9.8/9.8/9.8 mm\n"
+    assert out == f"done and stored: {words.split()[0]}\n{pads}"
+    assert (one.session.kind, one.session.unlocked) == (1, False)
+
+
+@pytest.mark.parametrize(
+    ("fields", "refuses", "says"),
+    [
+        ({"secret": b""}, None, "0x27 refused: conditionsNotCorrect: the ECU has no key"),
+        ({"secret": bytes(16)}, None, "0x27 refused: invalidKey: --key is another file"),
+        ({}, 0x22, "0x31 refused: conditionsNotCorrect: stop, release the brake"),
+        ({}, 0x21, "0x31 refused: busyRepeatRequest: another change"),
+        ({}, 0x72, "0x31 refused: generalProgrammingFailure: done, but not stored"),
+    ],
+)
+def test_work_that_is_refused(fields, refuses, says, diag, tester, world, key):
+    world.refuses = refuses
+    one = tester(**fields)
+    code, out, errors = diag(f"forget --key {key}", lambda request: [bytes.fromhex(one.ask(request.hex()))])
+    assert (code, out, world.works) == (1, "", [])
+    assert says in errors
+    assert errors.count("\n") == 1
+    assert one.session.kind == 1
+
+
 def test_an_ecu_of_another_program_is_read_as_far_as_it_is_known(diag):
     answers = {
         "19 02 08": b"\x59\x02\xff\xc1\x00\x87\x09",
@@ -140,7 +191,15 @@ def refused_by_the_bus(request):
         ("clear", lambda request: [b"\x7f\x14\xf0"], 1, "service 0x14 refused: 0xF0"),
         ("clear", refused_by_the_bus, 1, "the bus failed: network is down"),
         ("read mu_b", lambda request: [b"\x62\x99\x99\x00"], 1, "asked for 0x0110, the answer is of another"),
-        ("forget", None, 2, "diag: forget: not known; take faults, clear, read, info"),
+        ("forgot", None, 2, "not known; take faults, clear, read, info, new-pads, measured, forget; did you"),
+        ("forget", None, 2, "diag: forget: give --key FILE, that of --diagnostics-key"),
+        ("forget fl --key x", None, 2, "diag: fl: forget takes no name"),
+        ("faults --key x", None, 2, "diag: --key: is for new-pads, measured, forget; leave it out"),
+        ("new-pads --key x", None, 2, "diag new-pads: name front, rear, all, fl, fr, rl, rr"),
+        ("new-pads frnt --key x", None, 2, "did you mean front?"),
+        ("measured --key x", None, 2, "diag measured: give corner=mm, corners fl, fr, rl, rr"),
+        ("measured fl=thin --key x", None, 2, "diag measured: fl=thin: give corner=mm"),
+        ("forget --key /nowhere/key", None, 2, "/nowhere/key: cannot be read: No such file or directory"),
         ("fault", None, 2, "did you mean faults?"),
         ("faults mu_b", None, 2, "diag: mu_b: faults takes no name"),
         ("read mu_q", None, 2, "diag read: mu_q: give a name or a number such as 0x0110; did you mean mu_b?"),
