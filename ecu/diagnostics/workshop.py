@@ -1,7 +1,7 @@
 """Work of a workshop on the running loop: handed over as a calibration is, stored before it is confirmed."""
 
 import time
-from typing import Any, Final
+from typing import Final
 
 import structlog
 
@@ -17,10 +17,9 @@ from ecu.diagnostics.session import (
 )
 from ecu.errors import UserError
 from ecu.pads import pads, worn_off
-from ecu.recording.calibration import in_force
 from ecu.recording.ring import RingReader
-from ecu.runtime.asking import Busy, Sleep, taken_over, wait
-from ecu.settings.config import config_of, new_params
+from ecu.runtime.asking import Busy, Sleep, wait, worked
+from ecu.settings.config import config_of
 
 WHERE: Final = "diagnostics"
 STANDS_NOT: Final = "the car does not stand with released brakes, or nobody knows; stop and wait a second"
@@ -33,8 +32,7 @@ class Workshop:
 
     def __init__(self, reader: RingReader, *, kept: bool, sleep: Sleep = time.sleep) -> None:
         self._reader, self._kept, self._sleep = reader, kept, sleep
-        self._given: dict[str, Any] = reader.description["configuration"]
-        self._config = config_of(self._given, WHERE)
+        self._config = config_of(reader.description["configuration"], WHERE)
         self._log = structlog.get_logger("diagnostics")
 
     def do(self, kind: Kind, values: dict[str, float]) -> None:
@@ -43,11 +41,8 @@ class Workshop:
             raise self._refused(CONDITIONS_NOT_CORRECT, NOWHERE)
         wear = self._wear(values) if kind == Kind.MEASURED_PADS else values
         ring = self._reader.ring
-        found = in_force(ring)
-        tables = {} if found is None else found.tables
-        params = new_params(config_of({**self._given, **tables}, WHERE))
         try:
-            begins = taken_over(self._reader, params, tables, Work(kind, wear), self._sleep)
+            begins = worked(self._reader, Work(kind, wear), self._sleep)
         except Busy as busy:
             raise self._refused(BUSY, str(busy)) from None
         if begins is None:
@@ -73,9 +68,8 @@ class Workshop:
 
     def _lost(self) -> bool:
         """Return whether the last cycle says that nothing is kept."""
-        ring = self._reader.ring
-        slot = ring.slots[(int(ring.header["written"][0]) - 1) % len(ring.slots)].copy()
-        return bool(int(fault_mask(slot["recorded"]["outputs"].reshape(1))[0]) & NOT_KEPT)
+        last = self._reader.newest()
+        return last is None or bool(int(fault_mask(last["outputs"])[0]) & NOT_KEPT)
 
     def _refused(self, code: int, reason: str) -> Refused:
         self._log.warning("service_refused", reason=reason)

@@ -302,6 +302,13 @@ class RingReader:
         total = int(header["frames_written"])
         return total if header["written"] == number else None
 
+    def newest(self) -> RecordArray | None:
+        """Return the last cycle (`RECORDED`, shape (1,)), None before the first, or overtaken."""
+        written = int(self.ring.header[0]["written"])
+        place = (written - 1) % len(self.ring.slots)
+        slot = self.ring.slots[place : place + 1].copy()
+        return slot["recorded"] if written and slot["number"][0] == written - 1 else None
+
     def latest(self, name: str) -> RecordArray | None:
         """Return `learned` (LEARNED) or `watched` (INPUT_WATCH) of the last cycle, shape (1,), or None."""
         for _ in range(10):  # the writer may overtake us

@@ -8,9 +8,10 @@ from typing import Any, Final
 
 from ecu.contract.records import RecordArray
 from ecu.contract.work import Work
-from ecu.recording.calibration import ask
+from ecu.recording.calibration import ask, in_force
 from ecu.recording.ring import Ring, RingReader, open_own
 from ecu.runtime.clock import monotonic_s
+from ecu.settings.config import config_of, new_params
 
 ANSWERS_IN_S: Final = 0.5
 """The loop looks ten times a second."""
@@ -51,6 +52,14 @@ def taken_over(
         number = ask(reader.ring, params, tables, until_ns, work)
         wait(lambda: header["answered"][0] == number, sleep)
         return None if header["calibration"][0] == before else int(header["calibrated_from"][0])
+
+
+def worked(reader: RingReader, work: Work, sleep: Sleep = time.sleep) -> int | None:
+    """Have the loop do `work` and leave its parameters as they are; else as `taken_over`."""
+    found = in_force(reader.ring)
+    tables = {} if found is None else found.tables
+    params = new_params(config_of({**reader.description["configuration"], **tables}, reader.ring.path.name))
+    return taken_over(reader, params, tables, work, sleep)
 
 
 def wait(done: Callable[[], bool], sleep: Sleep) -> bool:

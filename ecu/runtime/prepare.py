@@ -273,6 +273,7 @@ def _side_arguments(options: RunOptions, taken: set[int]) -> list[str]:
         "--record": options.record,
         "--record-limit": options.record_limit,
         "--state": options.state,
+        "--standby": options.standby or None,
         "--metrics": options.metrics,
         "--diagnostics": diagnostics.checked_settings(
             *bus, options.diagnostics, options.diagnostics_key, taken, options.silent

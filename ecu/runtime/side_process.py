@@ -1,10 +1,11 @@
 """Side process of `run`: reads the ring, writes the recording, keeps the state store and logs events.
 
 `python -m ecu.runtime.side_process --ring RING --leash SOCKET --parent PID [--record DIR [--record-limit
-GB]] [--state DIR] [--metrics ADDRESS:PORT] [--diagnostics SETTINGS] [--xcp SETTINGS] [--again]`, started by
-`ecu/runtime/supervisor.py`. It ends when the ring is closed or the loop has died, after everything in the
-ring is written; signals to the group are left to the loop. A full disk ends the recording, nothing else; an
-unwritable store is tried again at the next change. `--again`: continue after an earlier one that died.
+GB]] [--state DIR] [--standby True] [--metrics ADDRESS:PORT] [--diagnostics SETTINGS] [--xcp SETTINGS]
+[--again]`, started by `ecu/runtime/supervisor.py`. It ends when the ring is closed or the loop has died,
+after everything in the ring is written; signals to the group are left to the loop. A full disk ends the
+recording, nothing else; an unwritable store is tried again at the next change. `--again`: continue after an
+earlier one that died.
 """
 
 import argparse
@@ -258,7 +259,7 @@ def main() -> int:
     parser.add_argument("--record", type=Path)
     parser.add_argument("--record-limit", type=float, default=math.inf)
     parser.add_argument("--state", type=Path)
-    for name in ("--metrics", "--diagnostics", "--xcp"):
+    for name in ("--standby", "--metrics", "--diagnostics", "--xcp"):
         parser.add_argument(name, help="of the supervisor that this process may become")
     parser.add_argument("--again", action="store_true")
     options = parser.parse_args()

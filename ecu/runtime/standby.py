@@ -17,6 +17,7 @@ one's memory is lost or wrong, and needs no reading in the cycle of the take-ove
 """
 
 import random
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -132,20 +133,26 @@ def _adopt_counters(plan: TransmitPlan, sent: Transmission, frames: Any, count: 
     return True
 
 
-def learned_by_first(description: dict[str, Any], mu_nominal: NDArray[np.float64]) -> RecordArray | None:
-    """Return the values learned by a living daemon on the same bus (`LEARNED`, shape (1,)), None without one.
-
-    `description` is that of one's own ring: bus, vehicle and layout must be the same. `mu_nominal` has
-    shape (4,).
-    """
+def rings_beside(description: dict[str, Any]) -> Iterator[RingReader]:
+    """Yield the rings of living daemons whose bus, vehicle and layout are those of `description`."""
     same = ("interface", "channel", "store_key", "state")
     for path in living_rings():
         try:
             reader = RingReader(path)
         except UserError:  # another user's, or another version's
             continue
-        if any(reader.description.get(name) != description[name] for name in same):
-            continue
+        if all(reader.description.get(name) == description[name] for name in same):
+            yield reader
+
+
+def learned_by_first(description: dict[str, Any], mu_nominal: NDArray[np.float64]) -> RecordArray | None:
+    """Return the values learned by a living daemon on the same bus (`LEARNED`, shape (1,)), None without one.
+
+    `description` is that of one's own ring: bus, vehicle and layout must be the same. `mu_nominal` has
+    shape (4,).
+    """
+    for reader in rings_beside(description):
+        path = reader.ring.path
         learned = reader.latest("learned")
         if learned is None:
             continue

@@ -3,7 +3,7 @@
 The loop starts no process once it is READY, so this small one does. It imports next to nothing and waits. It
 ends with the recorder when the loop has ended (exit code 0) or on a user error (2). A recorder whose
 supervisor died becomes one itself (`become`). With `--metrics ADDRESS:PORT`, `--diagnostics SETTINGS` or
-`--xcp SETTINGS` it also starts the processes that serve these.
+`--xcp SETTINGS` it also starts the processes that serve these, with `--standby` the one of `follow_first.py`.
 """
 
 import json
@@ -79,6 +79,8 @@ def _companions(arguments: Sequence[str]) -> list[Companion]:
         companions.append(Companion("ecu.diagnostics.process", picked, DIAGNOSTICS_PATIENCE_S))
     if "--xcp" in arguments:
         companions.append(Companion("ecu.xcp.process", _picked(arguments, "--ring", "--xcp"), XCP_PATIENCE_S))
+    if "--standby" in arguments:
+        companions.append(Companion("ecu.runtime.follow_first", _picked(arguments, "--ring")))
     return companions
 
 

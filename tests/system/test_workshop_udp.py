@@ -153,6 +153,22 @@ def test_a_tester_that_dies_in_the_middle_leaves_all_or_nothing(unit, car, tmp_p
     assert same_bits(read_recording(tmp_path / "record").folder, tmp_path / "result.parquet") == []
 
 
+def test_a_standby_does_what_is_done_to_the_first_one(unit, daemon, car, tmp_path):
+    bus = ("--config", ROOT / "config" / "suv.toml", "--armed", "-i", "udp_multicast", "-c", GROUP)
+    second = daemon(*bus, "--standby", "--state", tmp_path / "second")
+    second.wait_for("learned_from_ring")
+    car.set(decel_demand=0)
+    stop(car)
+    with foreign_tester() as client:
+        wait_for(lambda: done(client, WORKS["new pads"]))
+    assert second.wait_for("serviced", wear={"fl": 0.0, "fr": 0.0})["kind"] == "new_pads"
+    assert second.end() == 0
+    with closing(open_store(tmp_path / "second")) as store:
+        learned = restore(store, store_key(CONFIG), new_params(CONFIG)["mu_nominal"][0])[1]
+    assert learned["wear"]["told"].tolist() == [[1, 1, 0, 0]]
+    unharmed(unit, tmp_path / "record")
+
+
 @pytest.mark.requirement("REQ-WORK-1")
 def test_fuzzed_work_never_reaches_a_loop_that_drives(unit, tmp_path):
     draw = random.Random(31)

@@ -133,5 +133,5 @@ def test_while_another_asks_it_is_busy(serviced, monkeypatch):
     def busy(*_):
         raise Busy("another process asks")
 
-    monkeypatch.setattr("ecu.diagnostics.workshop.taken_over", busy)
+    monkeypatch.setattr("ecu.diagnostics.workshop.worked", busy)
     assert serviced.ask(Kind.FORGET) == (0x21, "another process asks")

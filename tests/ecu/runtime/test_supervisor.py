@@ -57,6 +57,7 @@ def test_it_is_started_again_with_pauses_that_grow(codes, gone_after, starts, pa
             ["--state", "DIR", "--diagnostics", "x"],
         ),
         (["--xcp", "x"], "ecu.xcp.process", ["--xcp", "x"]),
+        (["--standby", "True"], "ecu.runtime.follow_first", []),
     ],
 )
 def test_what_is_asked_for_is_served_by_a_process_beside_the_recorder(asked, module, given, monkeypatch):
