@@ -141,6 +141,10 @@ def run(
         Path | None, option("FILE", "Secret of a master that calibrates; without it none does")
     ] = None,
     xcp_save: Annotated[Path | None, option("FILE", "CONFIG file to write when a master stores")] = None,
+    cpu: Annotated[
+        int | None, option("N", "CPU of its loop; default: the last one that no other daemon has", min=0)
+    ] = None,
+    priority: Annotated[int, option("P", "Priority of its loop (SCHED_FIFO)", min=1, max=99)] = 50,
     log_format: Annotated[
         str | None,
         option(
@@ -183,6 +187,8 @@ def run(
             diagnostics_key,
             xcp,
             Calibrating(xcp_key, xcp_save),
+            cpu,
+            priority,
         )
     )
 

@@ -44,9 +44,9 @@ def diag(
         typer.Option("--key", metavar="FILE", help="Secret for new-pads, measured, forget: that of `run`"),
     ] = None,
 ) -> int:
-    """Ask an ECU on a bus for its faults and values, or register new and measured pads (UDS).
+    """Ask an ECU on a bus for its faults and values (UDS).
 
-    Exit code 1: it has confirmed faults."""
+    Register new and measured pads. Exit code 1: it has confirmed faults."""
     from ecu.diagnostics import tester
 
     return tester.diag(action, names or [], interface, channel, ids, key)

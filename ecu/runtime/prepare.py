@@ -37,7 +37,7 @@ from ecu.recording.ring import Ring, create_ring, remove_ring, ring_path
 from ecu.runtime import diagnostics, xcp
 from ecu.runtime.memory import Ecu, new_ecu
 from ecu.runtime.notify import Manager
-from ecu.runtime.realtime import freeze_memory, make_realtime
+from ecu.runtime.realtime import PRIORITY, check_cpu, freeze_memory, make_realtime
 from ecu.runtime.side import Side
 from ecu.runtime.standby import learned_by_first
 from ecu.runtime.start import lower_priority
@@ -77,6 +77,10 @@ class RunOptions(NamedTuple):
     """Transport on which a master of XCP is answered."""
     calibrating: Calibrating = Calibrating()
     """What it needs to calibrate."""
+    cpu: int | None = None
+    """To be pinned to; None: the last one that no other daemon has."""
+    priority: int = PRIORITY
+    """Of SCHED_FIFO."""
 
 
 class Session(NamedTuple):
@@ -126,6 +130,7 @@ def prepare(options: RunOptions) -> Session:
         _check_metrics(options.metrics)
     if options.silent and (options.armed or options.standby):
         raise UserError("--silent", "", "sends nothing, so it is neither armed nor a standby; leave one out")
+    check_cpu(options.cpu)
     manager = Manager()
     progress = CompileProgress(manager)
     compiled = CompileCounter(progress)
@@ -182,7 +187,7 @@ def prepare(options: RunOptions) -> Session:
         remove_ring(path)
         channel.close()
         raise
-    verdicts = make_realtime()
+    verdicts = make_realtime(options.cpu, options.priority)
     structlog.get_logger("ecu").info(
         "ready",
         channel=options.channel,

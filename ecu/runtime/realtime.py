@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 
 import structlog
 
+from ecu.errors import UserError
 from ecu.recording.ring import living_rings, ring_path
 
 PRIORITY: Final = 50  # of SCHED_FIFO: the priority that Linux gives its interrupt threads
@@ -25,8 +26,8 @@ class Verdict(NamedTuple):
     remedy: str
 
 
-def _fifo() -> None:
-    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+def _fifo(priority: int) -> None:
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
 
 
 def _lock_memory(which: int = _MCL_CURRENT | _MCL_FUTURE) -> None:
@@ -69,21 +70,21 @@ def _pinned() -> dict[int, int]:
     return found
 
 
-REQUESTS: Final[tuple[tuple[str, Callable[[], None], str], ...]] = (
-    (
-        "SCHED_FIFO",
-        _fifo,
-        f"grant CAP_SYS_NICE, or `rtprio {PRIORITY}` in /etc/security/limits.conf (ulimit -r), "
-        "or LimitRTPRIO in the unit",
-    ),
-    (
-        "mlockall",
-        _lock_memory,
-        "grant CAP_IPC_LOCK, or `memlock unlimited` in /etc/security/limits.conf (ulimit -l), "
-        "or LimitMEMLOCK=infinity in the unit",
-    ),
+FIFO_REMEDY: Final = (
+    "grant CAP_SYS_NICE, or `rtprio {}` in /etc/security/limits.conf (ulimit -r), or LimitRTPRIO in the unit"
 )
-AFFINITY: Final = ("affinity", pin, "let the cpuset of this process hold a CPU of its own")
+MEMORY_REMEDY: Final = (
+    "grant CAP_IPC_LOCK, or `memlock unlimited` in /etc/security/limits.conf (ulimit -l), "
+    "or LimitMEMLOCK=infinity in the unit"
+)
+CPU_REMEDY: Final = "let the cpuset of this process hold a CPU of its own"
+
+
+def check_cpu(cpu: int | None) -> None:
+    """Raise UserError for a CPU that this process may not use."""
+    allowed = os.sched_getaffinity(0)
+    if cpu is not None and cpu not in allowed:
+        raise UserError("--cpu", str(cpu), f"choose {', '.join(map(str, sorted(allowed)))}")
 
 
 def freeze_memory() -> None:
@@ -98,15 +99,20 @@ def freeze_memory() -> None:
         _lock_memory(_MCL_CURRENT)
 
 
-def make_realtime() -> list[Verdict]:
+def make_realtime(cpu: int | None = None, priority: int = PRIORITY) -> list[Verdict]:
     """Freeze memory, request SCHED_FIFO, locked memory and one CPU; return the verdicts.
 
-    A refusal is logged and the service continues.
+    A refusal is logged and the service continues. `cpu`: None: the last one that no other daemon has.
     """
     freeze_memory()
-    verdicts = [_attempt(*request) for request in REQUESTS]
-    if verdicts[0].granted:  # tied to one CPU without priority it could not dodge a busy neighbour
-        verdicts.append(_attempt(*AFFINITY))
+    verdicts = [
+        _attempt("SCHED_FIFO", lambda: _fifo(priority), FIFO_REMEDY.format(priority)),
+        _attempt("mlockall", _lock_memory, MEMORY_REMEDY),
+    ]
+    if cpu is not None:
+        verdicts.append(_attempt("affinity", lambda: os.sched_setaffinity(0, {cpu}), CPU_REMEDY))
+    elif verdicts[0].granted:  # tied to one CPU without priority it could not dodge a busy neighbour
+        verdicts.append(_attempt("affinity", pin, CPU_REMEDY))
     log = structlog.get_logger("realtime")
     for verdict in verdicts:
         if not verdict.granted:

@@ -7,16 +7,21 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from brakelab.plant.description import load_plant
+from brakelab.rig import vehicle_node
 from brakelab.rig.vehicle_node import drive_in_real_time, main, new_node, write_truth_file
 from brakelab.simulation.closed_loop import plans
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.simulation.scenario_car import scenario_plant
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
+from ecu import cli
 from ecu.bus.protocol import BusStatus
 from ecu.bus.transmit import frame_buffer, new_transmission, transmit
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import N_OUTPUTS, OUTPUT
 from ecu.runtime.clock import TimeSource
+from ecu.settings.config import load_config
 
 CONFIG = Path(__file__).parents[3] / "config"
 EPOCH_NS = 1_700_000_000_000_000_000
@@ -166,3 +171,48 @@ def test_a_mistake_is_one_line_and_exit_code_2(
     line = capsys.readouterr().err.strip().splitlines()
     assert len(line) == 1
     assert said in line[0]
+
+
+@pytest.mark.parametrize("plant", [None, "sedan", "as-config"])
+def test_the_command_drives_the_car_that_is_named(
+    plant: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    masses, truth = [], tmp_path / "truth.parquet"
+    clock = FakeClock()
+    short = tmp_path / "short.toml"
+    short.write_text('initial_speed = 20.0\nplant = "suv"\n[[phase]]\nkind = "coast"\nseconds = 0.2\n')
+    config = ["--config", "lcv"] if plant == "as-config" else []
+    monkeypatch.setattr(vehicle_node, "open_channel", lambda *bus, receive_ids: FakeBus(clock))
+    monkeypatch.setattr(vehicle_node, "system_time", clock.source)
+    monkeypatch.setattr(vehicle_node, "ask_for_priority", lambda: None)
+    monkeypatch.setattr(
+        vehicle_node, "warm_up", lambda driven: masses.append(scenario_plant(driven).vehicle.body.mass)
+    )
+    options = ["--plant", plant] if plant else []
+    words = ["vehicle", str(short), "-i", "virtual", "-c", "x", "--alone", "--truth", str(truth)]
+    assert cli.main([*words, *options, *config]) == 0
+    car = {None: "suv", "sedan": "sedan"}.get(plant)
+    expected = (
+        load_config(CONFIG / "lcv.toml").vehicle.mass
+        if car is None
+        else load_plant(CONFIG / "plant" / f"{car}.toml").vehicle.body.mass
+    )
+    assert masses == [pytest.approx(expected)]
+    assert pq.read_table(truth).num_rows == 20
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--plant", "as-config"], "--plant: as-config: of which car? give --config"),
+        (["--config", "lcv"], "--config: lcv: is the car of --plant as-config; give that, too"),
+        (["--plant", "tractor"], "tractor"),
+    ],
+)
+def test_the_command_names_a_car_that_is_none(
+    options: list[str], says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["vehicle", "stop-1", "-i", "virtual", "-c", "x", *options]) == 2
+    line = capsys.readouterr().err
+    assert says in line
+    assert line.count("\n") == 1

@@ -48,9 +48,9 @@ class Unit:
         self.turn()
 
     @property
-    def told(self):
+    def new_pads(self):
         """Whether the pads of each corner were registered as new."""
-        return self.ecu.state["learned"]["wear"]["told"][0].tolist()
+        return self.ecu.state["learned"]["wear"]["told"].tolist()[0]
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def test_what_is_done_to_the_first_one_is_done_to_its_standby_once(pair):
     pair.follower.look()
     pair.first.work(NEW_PADS)
     pair.follower.look()
-    assert pair.standby.told == pair.first.told == [1, 1, 0, 0]
+    assert pair.standby.new_pads == pair.first.new_pads == [1, 1, 0, 0]
     assert in_force(pair.standby.loop.ring).work == NEW_PADS
     pair.follower.look()
     assert in_force(pair.standby.loop.ring).number == 1
@@ -87,7 +87,7 @@ def test_work_before_the_standby_s_start_is_in_what_it_learned(pair):
     assert in_force(pair.standby.loop.ring) is None
     pair.first.work(Work(Kind.NEW_PADS, {"rl": 0.0}))
     pair.follower.look()
-    assert pair.standby.told == [0, 0, 1, 0]
+    assert pair.standby.new_pads == [0, 0, 1, 0]
 
 
 def test_a_calibration_is_the_first_one_s_own(pair):
@@ -106,10 +106,10 @@ def test_a_standby_that_moves_does_it_when_it_stands_again_however_late(pair):
         pair.first.loop.publish(3000)  # out of the ring
         pair.follower.look()
     assert [line["event"] for line in lines] == ["work_waits"]
-    assert pair.standby.told == [0, 0, 0, 0]
+    assert pair.standby.new_pads == [0, 0, 0, 0]
     pair.standby.ecu.estimate["speed"] = 0.0
     pair.follower.look()
-    assert pair.standby.told == [1, 1, 0, 0]
+    assert pair.standby.new_pads == [1, 1, 0, 0]
 
 
 def test_what_came_too_soon_after_another_is_a_line(pair):

@@ -1,16 +1,28 @@
 import gc
 import os
+from contextlib import contextmanager
 
 import pytest
 from structlog.testing import capture_logs
 
+from ecu.errors import UserError
 from ecu.recording import ring as ring_module
 from ecu.recording.ring import ring_path
 from ecu.runtime import realtime
 
 
-def refused():
+def refused(*_):
     raise PermissionError(1, "Operation not permitted")
+
+
+@contextmanager
+def rights():
+    """Undo what asking for rights does to this process's memory."""
+    try:
+        yield
+    finally:
+        gc.enable()
+        gc.unfreeze()
 
 
 # what the kernel grants -> the verdicts, the lines that are logged
@@ -23,22 +35,36 @@ GRANTS = {
 
 @pytest.mark.parametrize(("granted", "verdicts", "lines"), GRANTS.values(), ids=GRANTS)
 def test_each_refusal_is_one_line_with_its_remedy(monkeypatch, granted, verdicts, lines):
-    answers = [(lambda: None) if grant else refused for grant in granted]
-    requests = tuple(
-        (name, answer, remedy) for (name, _, remedy), answer in zip(realtime.REQUESTS, answers, strict=True)
-    )
-    monkeypatch.setattr(realtime, "REQUESTS", requests)
-    monkeypatch.setattr(realtime, "AFFINITY", ("affinity", lambda: None, ""))
-    try:
-        with capture_logs() as logged:
-            found = realtime.make_realtime()
+    answers = [(lambda *_: None) if grant else refused for grant in granted]
+    for name, answer in zip(("_fifo", "_lock_memory", "pin"), [*answers, lambda: None], strict=True):
+        monkeypatch.setattr(realtime, name, answer)
+    with rights(), capture_logs() as logged:
+        found = realtime.make_realtime()
         assert not gc.isenabled()
-    finally:
-        gc.enable()
-        gc.unfreeze()
     assert [(verdict.name, verdict.granted) for verdict in found] == verdicts
     assert [line["what"] for line in logged] == lines
     assert all("limits.conf" in line["remedy"] for line in logged)
+
+
+@pytest.mark.parametrize("granted", [True, False])
+def test_cpu_and_priority_are_those_asked_for(granted, monkeypatch):
+    asked = {}
+    fifo = (lambda _, kind, given: asked.update(priority=given.sched_priority)) if granted else refused
+    monkeypatch.setattr(os, "sched_setscheduler", fifo)
+    monkeypatch.setattr(os, "sched_setaffinity", lambda _, given: asked.update(cpu=given))
+    monkeypatch.setattr(realtime, "_lock_memory", lambda *_: None)
+    with rights(), capture_logs() as logged:
+        realtime.make_realtime(cpu=3, priority=80)
+    assert asked == ({"cpu": {3}, "priority": 80} if granted else {"cpu": {3}})
+    assert [("rtprio 80" in line["remedy"]) for line in logged] == ([] if granted else [True])
+
+
+def test_a_cpu_that_is_not_there_is_named_at_once(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {1, 0, 2})
+    realtime.check_cpu(None)
+    realtime.check_cpu(2)
+    with pytest.raises(UserError, match="--cpu: 3: choose 0, 1, 2"):
+        realtime.check_cpu(3)
 
 
 def test_a_daemon_sees_the_others_of_its_user(monkeypatch, tmp_path):

@@ -77,6 +77,27 @@ def simulate(
 
 
 @app.command()
+def vehicle(
+    scenario: Scenario,
+    interface: Interface,
+    channel: Channel,
+    seed: Seed = 0,
+    plant: Plant = None,
+    config: Annotated[Path | None, CONFIG_OPTION] = None,
+    truth: Annotated[Path | None, option("FILE.parquet", "True values of the drive, to write")] = None,
+    alone: Annotated[bool, flag("--alone", "Set off at once, without waiting for an ECU")] = False,
+) -> int:
+    """Drive the simulated car of a scenario alone on a bus.
+
+    It sets off when it hears an ECU, which you start, and leaves when that falls silent. CONFIG is the car
+    of --plant as-config."""
+    from brakelab.rig import vehicle_node
+
+    bus = interface, channel
+    return vehicle_node.vehicle_command(scenario, bus, seed, plant, config, truth, alone)
+
+
+@app.command()
 def rig(
     scenario: Annotated[
         list[str],

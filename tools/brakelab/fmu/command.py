@@ -12,9 +12,8 @@ from brakelab.fmu.ecu_unit import ecu_unit
 from brakelab.fmu.source import c_source
 from brakelab.fmu.unit import Unit
 from brakelab.fmu.vehicle_unit import vehicle_unit
-from brakelab.simulation.plant_of_config import AS_CONFIG
 from brakelab.simulation.scenario import load_scenario
-from brakelab.simulation.scenario_car import with_draw, with_plant, with_plant_for
+from brakelab.simulation.scenario_car import with_car, with_draw
 from ecu.building.c_compiler import compile_shared
 from ecu.errors import UserError
 from ecu.library import BASELINE, V3
@@ -55,20 +54,11 @@ def write_vehicle(
     Raises:
         UserError: as `write_ecu`, of the scenario; "as-config" without `config`, or this without that.
     """
-    if config is not None and plant != AS_CONFIG:
-        raise UserError(
-            "--config", command_name(config), f"is the car of --plant {AS_CONFIG}; give that, too"
-        )
     driven = load_scenario(scenario)
     if draw is not None:
         driven = with_draw(driven, draw)
     with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder:
-        if plant != AS_CONFIG:
-            driven = with_plant(driven, plant)
-        elif config is not None:
-            driven = with_plant_for(driven, plant, load_config(config), Path(folder))
-        else:
-            raise UserError("--plant", plant, "of which car? give --config")
+        driven = with_car(driven, plant, config, Path(folder))
         write_fmu(vehicle_unit(driven, seed, command_name(scenario)), out, version)
     return 0
 

@@ -10,8 +10,8 @@ from brakelab.plant.draw import Widths, load_widths
 from brakelab.simulation.plant_of_config import AS_CONFIG, write_plant
 from brakelab.simulation.scenario import Scenario
 from ecu.errors import UserError
-from ecu.settings.config import Config
-from ecu.settings.resources import named, resource
+from ecu.settings.config import Config, load_config
+from ecu.settings.resources import command_name, named, resource
 
 ANOTHER: Final = 0.10
 """Relative difference from which on a car is not the configured one."""
@@ -48,6 +48,23 @@ def with_plant_for(scenario: Scenario, plant: str | None, config: Config, folder
     """
     if plant == AS_CONFIG:
         plant = str(write_plant(config, named(scenario.plant, "config/plant"), folder))
+    return with_plant(scenario, plant)
+
+
+def with_car(scenario: Scenario, plant: str | None, config: Path | None, folder: Path) -> Scenario:
+    """Return a scenario as `with_plant_for` does; the file `config` is of "as-config" and of no other car.
+
+    Raises:
+        UserError: as there; "as-config" without `config`, or this without that.
+    """
+    if plant == AS_CONFIG and config is not None:
+        return with_plant_for(scenario, plant, load_config(config), folder)
+    if plant == AS_CONFIG:
+        raise UserError("--plant", plant, "of which car? give --config")
+    if config is not None:
+        raise UserError(
+            "--config", command_name(config), f"is the car of --plant {AS_CONFIG}; give that, too"
+        )
     return with_plant(scenario, plant)
 
 
