@@ -44,6 +44,7 @@ OWN_NAME = {
         "tests/ecu/diagnostics/test_workshop.py",
         "tests/ecu/recording/test_store.py",
         "tests/ecu/runtime/test_calibration.py",
+        "tests/ecu/runtime/test_follow_first.py",
         "tests/ecu/test_pads.py",
         "tests/ecu/test_workshop.py",
         "tests/system/test_workshop_udp.py",
