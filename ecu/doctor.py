@@ -29,10 +29,13 @@ from ecu.contract.records import FRAME, INPUTS, new_record
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS
 from ecu.errors import UserError
 from ecu.output import give, say
+from ecu.recording.ring import RingReader
 from ecu.runtime.memory import new_ecu
 from ecu.runtime.warm_up import warm_up
-from ecu.settings.config import load_config, new_params
+from ecu.settings.config import config_of, load_config, new_params
 from ecu.settings.resources import resource
+from ecu.unit_lateness import VERBS, lateness_line
+from ecu.watch.daemons import running
 
 LISTEN_S: Final = 2.0
 SLEEPS: Final = 50
@@ -81,6 +84,7 @@ def doctor(config: Path | None, map: Path | None, interface: str | None, channel
     if interface is not None and channel is not None:
         say(f"listening to {channel} for {LISTEN_S:.0f} s")
         checks += bus(interface, channel, plan, config)
+        checks += [hydraulics(RingReader(one.path)) for one in running() if one.on_bus(interface, channel)]
     _show(checks)
     give(checks=[check._replace(remedy="") if check.good else check for check in checks])
     return 0 if all(check.good for check in checks) else 1
@@ -222,6 +226,17 @@ def bus(interface: str, channel: str, plan: ReceivePlan, config: Path | None) ->
         f"bus {channel}", off == "active", off, "check wiring, termination, bit rate; ip -details link"
     )
     return [line, *messages(plan, reception, LISTEN_S)]
+
+
+def hydraulics(reader: RingReader) -> Check:
+    """Compare [hydraulics] with how late a running daemon has found the pressures behind its demands."""
+    name, last = f"hydraulics of {reader.description['name']}", reader.newest()
+    outputs = None if last is None else last["outputs"][0]
+    if outputs is None or not np.isfinite([outputs[f"pressure_lateness_{verb}"] for verb in VERBS]).any():
+        return Check(name, True, "lateness of pressures not learned in this run: an armed car has to brake")
+    params = new_params(config_of(reader.description["configuration"], name))
+    found, _, remedy = lateness_line(params[0], outputs).rpartition(": ")
+    return Check(name, not found, found or "pressures follow as [hydraulics] says", remedy)
 
 
 def listen(channel: Channel, plan: ReceivePlan, seconds: float) -> Reception:

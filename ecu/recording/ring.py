@@ -206,12 +206,10 @@ def create_ring(
         raise UserError(
             str(path), "", f"cannot make a ring of {size >> 20} MB there: {error.strerror}"
         ) from None
-    header = np.frombuffer(memory, _HEADER, 1)
-    row = header[0]
+    row = np.frombuffer(memory, _HEADER, 1)[0]
     row["slots"], row["frames"], row["followed"] = slots, frames, -1
     row["description_bytes"], row["initial_bytes"] = len(text), len(initial)
-    at = _HEAD
-    memory[at : at + len(text) + len(initial)] = text + initial
+    memory[_HEAD : _HEAD + len(text) + len(initial)] = text + initial
     ring = _map(path, memory)
     ring.slots["number"] = -1
     row["magic"] = _MAGIC
@@ -258,10 +256,9 @@ class RingReader:
             raise UserError(str(path), "", "not a ring of this version; start the service anew")
         self.ring = _map(path, memory)
         row = self.ring.header[0]
-        at = _HEAD
-        end = at + int(row["description_bytes"])
+        end = _HEAD + int(row["description_bytes"])
         try:
-            self.description: dict[str, Any] = dict(json.loads(memory[at:end]))
+            self.description: dict[str, Any] = dict(json.loads(memory[_HEAD:end]))
         except _NO_OBJECT:
             raise UserError(str(path), "", "not a ring: its description cannot be read") from None
         self.initial: bytes = memory[end : end + int(row["initial_bytes"])]
@@ -288,9 +285,16 @@ class RingReader:
 
     def go_on_after(self, number: int) -> RecordArray | None:
         """Continue after cycle `number`; return that cycle (`RECORDED`, shape (1,)) if it is present."""
+        self._next = number + 1
+        return self._cycle(number)
+
+    def newest(self) -> RecordArray | None:
+        """Return the last cycle (`RECORDED`, shape (1,)), None before the first, or overtaken."""
+        return self._cycle(int(self.ring.header[0]["written"]) - 1)
+
+    def _cycle(self, number: int) -> RecordArray | None:
         place = number % len(self.ring.slots)
         slot = self.ring.slots[place : place + 1].copy()
-        self._next = number + 1
         return slot["recorded"] if slot["number"][0] == number >= 0 else None
 
     def frames_before(self, number: int) -> int | None:
@@ -301,13 +305,6 @@ class RingReader:
             return int(slot["first_frame"])
         total = int(header["frames_written"])
         return total if header["written"] == number else None
-
-    def newest(self) -> RecordArray | None:
-        """Return the last cycle (`RECORDED`, shape (1,)), None before the first, or overtaken."""
-        written = int(self.ring.header[0]["written"])
-        place = (written - 1) % len(self.ring.slots)
-        slot = self.ring.slots[place : place + 1].copy()
-        return slot["recorded"] if written and slot["number"][0] == written - 1 else None
 
     def latest(self, name: str) -> RecordArray | None:
         """Return `learned` (LEARNED) or `watched` (INPUT_WATCH) of the last cycle, shape (1,), or None."""

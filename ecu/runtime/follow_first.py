@@ -19,11 +19,10 @@ from ecu.recording.ring import RingReader
 from ecu.runtime.asking import Busy, Sleep, worked
 from ecu.runtime.companion import await_ring, begin_companion
 from ecu.runtime.standby import rings_beside
-from ecu.watch.daemons import is_held
 
 PERIOD_S: Final = 0.05
 """A loop takes over ten changes a second at most."""
-LOOK_FOR_FIRST_S: Final = 1.0
+LOOK_FOR_FIRST_S: Final = 5.0
 
 
 class Follower:
@@ -39,10 +38,13 @@ class Follower:
         self._log = structlog.get_logger("standby")
 
     def look(self) -> float:
-        """Do what a workshop did to the first one since the last look; return when to look again [s]."""
+        """Do what a workshop did to the first one since the last look; return when to look again [s].
+
+        A first one that is killed makes this one speak.
+        """
         if _speaks(self.own):
             self._first = None
-        elif self._first is None or not is_held(self._first.ring.path):
+        elif self._first is None or self._first.closed:
             self._first = self._found()
         if self._first is None:
             return LOOK_FOR_FIRST_S

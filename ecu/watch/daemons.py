@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from ecu.errors import UserError
 from ecu.recording.lock import lock
+from ecu.recording.recorder import interface_name
 from ecu.recording.ring import RingReader, open_own, ring_folder
 
 
@@ -34,6 +35,10 @@ class Daemon(NamedTuple):
     def answers_to(self, wanted: str) -> bool:
         """Return whether `wanted` is its process, channel, car or ring."""
         return wanted in (str(self.pid), self.channel, self.name, str(self.path))
+
+    def on_bus(self, interface: str, channel: str) -> bool:
+        """Return whether it runs on that bus."""
+        return (self.interface, self.channel) == (interface, interface_name(channel))
 
     def follows(self, other: "Daemon") -> bool:
         """Return whether it serves the same car on the same bus as `other`."""

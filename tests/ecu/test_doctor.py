@@ -7,9 +7,16 @@ import pytest
 from ecu.bus.receive import new_reception
 from ecu.bus.receive_plan import contract_receive_plan
 from ecu.bus.transmit import contract_transmit_plan
-from ecu.doctor import bit_rate, bus_load, doctor, kernels, machine, messages, unit
+from ecu.doctor import bit_rate, bus_load, doctor, hydraulics, kernels, machine, messages, unit
 from ecu.errors import UserError
+from ecu.recording.ring import RingReader
+from ecu.settings.config import load_config
 from ecu.settings.resources import resource
+from ecu.watch.daemons import running
+
+from .watch.conftest import loop, rings
+
+__all__ = ["loop", "rings"]
 
 DBC = Path(__file__).parents[2] / "dbc" / "brake_ecu.dbc"
 
@@ -130,3 +137,31 @@ def test_the_unit_has_what_the_daemon_relies_on(tmp_path, text, good, found):
     check = unit((tmp_path,))
     assert (check.good, found in check.found) == (good, True)
     assert good or "tools/deploy" in check.remedy
+
+
+@pytest.mark.parametrize(
+    ("rise", "good", "found", "remedy"),
+    [
+        (0.126, False, "pressures rise 126 ms after their demands (CONFIG: 63 ms)", "dead times and lags"),
+        (0.065, True, "pressures follow as [hydraulics] says", ""),
+        (float("nan"), True, "not learned in this run", ""),
+        (None, True, "not learned in this run", ""),  # no cycle yet
+    ],
+)
+def test_a_running_daemon_says_how_late_its_pressures_are(rise, good, found, remedy, loop):
+    run = loop(configuration=load_config(resource("config/suv.toml")).model_dump())
+    if rise is not None:
+        run.publish(1, pressure_lateness_rise=rise, pressure_lateness_fall=float("nan"))
+    check = hydraulics(RingReader(run.ring.path))
+    assert (check.name, check.good) == ("hydraulics of suv", good)
+    assert found in check.found
+    assert remedy in check.remedy
+
+
+@pytest.mark.parametrize(
+    ("interface", "channel", "on"),
+    [("socketcan", "can0", True), ("socketcan", "can1", False), ("udp_multicast", "can0", False)],
+)
+def test_only_daemons_of_that_bus_are_asked(interface, channel, on, loop):
+    run = loop()
+    assert [one.on_bus(interface, channel) for one in running()] == [on], run

@@ -16,7 +16,6 @@ from brakelab.logs.signal_file import freshness_at_any_rate, read_signals
 from brakelab.replay.calibrated import changes_of
 from brakelab.replay.earlier_layout import convert_initial
 from brakelab.replay.engine import Ecu, Rows, run_frames, run_samples
-from brakelab.replay.lateness import lateness_line
 from brakelab.replay.quality import Findings, identifier, note_faults
 from brakelab.replay.seen import set_raw_ends
 from brakelab.replay.source import Source, only_interface
@@ -27,6 +26,7 @@ from ecu.contract.faults import FOREIGN_SENDER
 from ecu.contract.records import CYCLE, EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, RecordArray
 from ecu.errors import UserError
 from ecu.recording.recorder import Recording, read_recording
+from ecu.unit_lateness import lateness_line
 
 
 def log_size(path: Path) -> int:

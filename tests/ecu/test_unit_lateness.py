@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brakelab.replay.lateness import lateness_line
 from ecu.contract.records import OUTPUTS
 from ecu.settings.config import load_config, new_params
+from ecu.unit_lateness import lateness_line
 
 REMEDY = "correct dead times and lags of [hydraulics]"
-SUV = Path(__file__).parents[3] / "config" / "suv.toml"
+SUV = Path(__file__).parents[2] / "config" / "suv.toml"
 
 
 @pytest.mark.parametrize(
