@@ -95,3 +95,17 @@ class Watcher:
         line = f"{self.daemon.label}: {how}"
         self.history.tell(line, serious=True)
         self.trouble, self.reader = f"{line}; waiting for the next one", None
+
+
+def follow(watcher: Watcher, turn: Callable[[], object]) -> int:
+    """Take `turn` after turn until Ctrl-C, and print what becomes of the connection; return 0."""
+    trouble = watcher.trouble
+    try:
+        while True:
+            turn()
+            if watcher.trouble != trouble:
+                trouble = watcher.trouble
+                print(trouble or f"attached to {watcher.daemon and watcher.daemon.label}", flush=True)
+            time.sleep(PERIOD_S)
+    except KeyboardInterrupt:
+        return 0

@@ -7,7 +7,6 @@ of his own in the rows: a slow one gets more of them at once, later, and holds n
 import json
 import math
 import threading
-import time
 from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
@@ -22,7 +21,7 @@ from ecu.recording.events import MODES
 from ecu.watch.history import COLUMNS, LATENESS_US, REMEMBERED_S, SHOWN_S, Row, frames_text
 from ecu.watch.keep import keep_now
 from ecu.watch.serve import Handler, Server
-from ecu.watch.watcher import PERIOD_S, Watcher
+from ecu.watch.watcher import Watcher, follow
 
 QUIET_S: Final = 1.0
 """Interval at which a viewer gets the state when there are no rows."""
@@ -150,15 +149,7 @@ def serve(watcher: Watcher, port: int, folder: Path) -> int:
         f"http://127.0.0.1:{server.server_port}/ (Ctrl-C ends it); {watcher.trouble or 'attached'}",
         flush=True,
     )
-    trouble = watcher.trouble
     try:
-        while True:
-            shared.turn()
-            if watcher.trouble != trouble:
-                trouble = watcher.trouble
-                print(trouble or f"attached to {watcher.daemon and watcher.daemon.label}", flush=True)
-            time.sleep(PERIOD_S)
-    except KeyboardInterrupt:
-        return 0
+        return follow(watcher, shared.turn)
     finally:
         server.server_close()

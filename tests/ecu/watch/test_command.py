@@ -6,7 +6,7 @@ from ecu import cli
 @pytest.mark.parametrize(
     ("line", "says"),
     [
-        ("watch --web --json", "--json: gives lines, --web a page"),
+        ("watch --web --json", "--json gives lines, --web a page"),
         ("watch --port many", "'--port': input should be a valid integer"),
         ("watch --port 99999", "65535"),
         ("watch one two", "unexpected extra argument"),
