@@ -30,7 +30,7 @@ from ecu.algorithm.monitoring.accel_error import (
 )
 from ecu.algorithm.monitoring.acceleration import BLOCK_S, KNOWN_MOTORS
 from ecu.algorithm.monitoring.error_line import moved_offset
-from ecu.algorithm.monitoring.witness import AGAIN_S, FASTEST_DOUBT, compare, judge
+from ecu.algorithm.monitoring.witness import AGAIN_S, FASTEST_DOUBT, believe, compare, judge
 from ecu.contract.params import GRAVITY
 from ecu.contract.signals import ACCEL_X, MOTOR_TORQUE
 from ecu.jit import Record, kernel
@@ -211,19 +211,29 @@ def _follow_share(state: Record, i: int, share: float, dt: float) -> None:
 
 @kernel
 def compare_motors(
-    params: Record, state: Record, witness: Record, inputs: Record, blending: Record, dt: float
+    params: Record,
+    state: Record,
+    witness: Record,
+    inputs: Record,
+    blending: Record,
+    lines: Record,
+    dt: float,
 ) -> None:
     """Judge the torques of motors that brake, by the demands that were sent.
+
+    One that gives far less, and whose torque was as usual while it drove, is short: its limit is wrong.
 
     Args:
         params: `PARAMS`.
         state: `MOTORS_WATCH_STATE`, overwritten.
         witness: `WITNESS_STATE`; the four torques' fields are overwritten.
         inputs: `INPUTS` as received.
-        blending: `BLENDING_STATE` of the last cycle.
+        blending: `BLENDING_STATE` of the last cycle; `lost` is overwritten.
+        lines: `ACCEL_ERROR_STATE`.
         dt: time since the last cycle [s].
     """
     gain = lag_gain(dt, GAP_LAG)
+    drove = usual_known(lines) and state.moved_s == 0.0
     for i in range(4):
         place, asked = MOTOR_TORQUE + i, blending.asked
         if params.blending[i] == 0.0 or witness.rejected[place] or not usable(inputs, place):
@@ -231,11 +241,16 @@ def compare_motors(
         most = max(asked[0, i], asked[1, i], asked[2, i])
         least = min(asked[0, i], asked[1, i], asked[2, i], max(blending.limit[i], 0.0))
         torque, usual = inputs.value[place], 1.0 + state.share[i]
-        state.gap[i] += gain * (torque - min(max(torque, usual * least), usual * most) - state.gap[i])
+        gap = torque - min(max(torque, usual * least), usual * most)
+        state.gap[i] += gain * (gap - state.gap[i])
         tolerance = GAP + GAP_SHARE * most
+        short = drove and gap < -tolerance
         if state.share_s[i] > FEWEST_S:
             tolerance = USUAL_GAP + USUAL_GAP_SHARE * most
         judge(witness, place, state.gap[i], tolerance, GAP_DOUBT_S, dt)
+        if short and witness.rejected[place]:
+            blending.lost[i], state.gap[i] = 1, 0.0
+            believe(witness, place)
         steady = least > (1.0 - STEADY) * most and most > LEAST_ASKED
         if steady and abs(state.gap[i]) < USUAL * tolerance:
             _follow_share(state, i, 2.0 * torque / (least + most) - 1.0, dt)

@@ -69,7 +69,7 @@ def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
         watch_motors(p, s.motors, s.witness, u, estimate, base, s.accel_error, s.acceleration, dt)
     asked = braking and requested_decel(p, u) > LEAST_REQUEST
     if asked and s.plausibility.sent and not (driver_accelerates(u) or others_brake(u)):
-        compare_motors(p, s.motors, s.witness, u, s.blending, dt)
+        compare_motors(p, s.motors, s.witness, u, s.blending, s.accel_error, dt)
         if s.application.duration_s > LET_GO_S and estimate.speed > LEAST_SPEED:
             deny_drive(p, s.motors, s.witness, u, dt)
     watch_speeds(p, s.speeds, s.witness, u, estimate, s.guard.acting != 0, dt)

@@ -10,7 +10,7 @@ from brakelab.studies import lies_table
 from brakelab.studies.lies import CARS, INPUTS, ROADS, SPLIT_ACCEL, cells, lies, scenario
 from brakelab.studies.lies_cell import DECEL, Cell, judge
 from brakelab.studies.lies_table import driven, lie_tables, why
-from ecu.contract.faults import IMPLAUSIBLE, WHEEL_SLIPS, WORD
+from ecu.contract.faults import ACCEL_IMPLAUSIBLE, IMPLAUSIBLE, MOTOR_SHORT, WHEEL_SLIPS, WORD
 from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import CORNERS
 
@@ -97,6 +97,20 @@ def test_when_the_lie_is_reported_and_as_what(faults, named, late, first) -> Non
     assert (found.named_s, found.late_s) == pytest.approx((named, late), nan_ok=True, abs=0.011)
     assert found.first == first
     assert found.others == sum(bit for bit in faults if bit != OWN)
+
+
+NAMES = [
+    ("wheel_speed_fl", OWN, True),
+    ("accel_x", ACCEL_IMPLAUSIBLE, True),
+    ("motor_limit_fl", MOTOR_SHORT, True),
+    ("motor_torque_fl", MOTOR_SHORT, False),
+]
+
+
+@pytest.mark.parametrize(("signal", "bit", "named"), NAMES)
+def test_the_faults_that_name_an_input(signal: str, bit: int, named: bool) -> None:
+    found = judge(NAME, drive(faults={bit: 25.0}), drive(), MASS, (signal,))
+    assert math.isfinite(found.named_s) == named
 
 
 def test_what_the_sound_car_tells_is_an_alarm_and_not_the_lie_s() -> None:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from brakelab.simulation.closed_loop import Drive
 from brakelab.stretches import stretches
-from ecu.contract.faults import ACCEL_IMPLAUSIBLE, IMPLAUSIBLE, fault_mask
+from ecu.contract.faults import ACCEL_IMPLAUSIBLE, IMPLAUSIBLE, MOTOR_SHORT, fault_mask
 from ecu.contract.signals import CORNERS
 
 Vector = NDArray[np.float64]
@@ -156,9 +156,10 @@ def _cause(drive: Drive, sound: Drive, rows: NDArray[np.intp], beside: NDArray[n
 
 
 def _named(signals: tuple[str, ...]) -> int:
-    """Return the mask of the faults that tell one of `signals` by its name."""
+    """Return the mask of the faults that name one of `signals`; of a limit, that its motor is short."""
     own = sum(IMPLAUSIBLE.get(signal, 0) for signal in signals)
-    return own | (ACCEL_IMPLAUSIBLE if "accel_x" in signals else 0)
+    own |= ACCEL_IMPLAUSIBLE if "accel_x" in signals else 0
+    return own | (MOTOR_SHORT if signals[0].startswith("motor_limit") else 0)
 
 
 def _first(t: Vector, masks: NDArray[np.int64]) -> tuple[float, int]:

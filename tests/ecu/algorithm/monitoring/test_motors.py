@@ -100,7 +100,7 @@ class Car:
         self.blending["asked"], self.blending["limit"] = np.reshape(asked, (3, 1)), limit
         for _ in range(round(seconds / DT)):
             self.feed(self.inputs, motor_torque=torque)
-            compare_motors(self.p, self.state, self.witness, self.inputs[0], self.blending, DT)
+            compare_motors(self.p, self.state, self.witness, self.inputs[0], self.blending, self.lines, DT)
         return self.rejected()
 
 
@@ -169,6 +169,7 @@ def test_who_drives_the_car_as_he_says_is_believed_again(car: Car, reads: float,
     assert car.drive(0.8, decel=-0.4, accelerator_position=30.0) == left_out, "only after a second"
 
 
+DRIVES = {"decel": -1.0}
 DEMANDS = [
     # demands of the last three cycles, the newest first, limit, torque [N m]; left out
     ((500.0, 500.0, 500.0), 1000.0, 500.0, False),
@@ -192,6 +193,31 @@ def test_a_motor_gives_what_was_demanded_of_it(car: Car, asked, limit, torque, l
     assert car.obey(5.0, asked, torque, limit) == (ALL if left_out else ())
 
 
+FAR = GAP + GAP_SHARE * 500.0
+SHORT = [
+    # torque of motors that drove as usual and are asked for 500 N m; left out, short
+    (500.0 - 1.05 * FAR, (), True),
+    (500.0 - 0.95 * FAR, ALL, False),  # more than the usual share allows: it has drifted
+    (500.0 + 1.05 * FAR, ALL, False),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("torque", "left_out", "short"), SHORT)
+def test_a_motor_that_drove_as_usual_and_gives_far_less_has_a_wrong_limit(
+    car: Car, torque, left_out, short
+) -> None:
+    asked = (500.0,) * 3
+    assert car.known(10.0, **DRIVES) == car.obey(10.0, asked, 500.0) == ()
+    assert car.obey(0.5, asked, torque) == left_out
+    assert car.blending["lost"].all() == car.blending["lost"].any() == short
+
+
+def test_a_motor_that_drove_wrongly_is_not_short(car: Car) -> None:
+    car.known(10.0, **DRIVES)
+    car.state["moved_s"] = 0.1
+    assert car.obey(5.0, (500.0,) * 3, 500.0 - 1.05 * FAR) == ALL
+
+
 def test_what_does_not_blend_or_is_stale_is_not_compared(car: Car) -> None:
     car.p["blending"][2] = 0.0
     car.inputs["verdict"][0, MOTOR_TORQUE + 3] = 0
@@ -203,7 +229,6 @@ def test_a_gap_is_judged_within_half_a_second(car: Car) -> None:
     assert car.obey(0.4, (500.0,) * 3, 400.0) == ALL
 
 
-DRIVES = {"decel": -1.0}
 MOVED = [
     # case, what the car does after 10 s in which all read right, seconds, left out
     ("all right", DRIVES, 20.0, ()),
