@@ -13,9 +13,9 @@ functions do (ECE R13-H, Annex 5: the rear uses no more grip than the front):
   torque of the rear axle moves to the front one until it no longer does. A front wheel counts as no faster
   than the ground: one whose speed is late or scaled alone takes nothing. One that the slip guard holds is no
   measure: just cut, it slips less than it can. This needs no friction estimate. A wheel that slips as before
-  `DENIED_S` after its axle was relieved does not slip: what it reads less is taken for its radius.
-  Beside a front wheel whose brake has failed it may slip `LONE_SLIP`. The front takes all of it up to `GRIP`
-  of its load, beyond that slowly; none from when it slips more than `GRIP_SLIP`.
+  `DENIED_S` after its axle was relieved does not slip: what it reads less, and slowly less in this braking,
+  is taken for its radius. Beside a front wheel whose brake has failed it may slip `LONE_SLIP`. The front
+  takes all of it up to `GRIP` of its load, beyond that slowly; none from when it slips more than `GRIP_SLIP`.
 - `cap_trailing`: compensation raises the rear's pressure relative to the front's only as far as the estimate
   is certain, with the rear at mu + 2 sigma and the front at mu - 2 sigma.
 
@@ -57,7 +57,7 @@ TAKE_BACK = 600.0  # 1/s per slip: 1 % excess reduces the torque at 6 1/s
 GIVE_BACK, GIVE_BACK_DENIED = 0.3, 2.0  # 1/s
 RELIEVED, DENIED_S = 0.7, 0.25  # share kept, s: a wheel that slips turns faster then, on ice too
 AS_BEFORE, DEEPEST = 0.8, 0.1  # of the slip; slip beyond which a wheel locks
-DENIES = 10.0  # 1/s
+DENIES, GROWS = 10.0, 0.03  # 1/s, of what is beyond; slip beyond that grows as a wheel's that locks
 SMOOTHING = 0.2  # per sample: 50 ms; leaves a fifth of the wheel speeds' noise
 LEARNING_TIME = 2.0  # s
 RADIUS_DOUBT = 0.008  # before learning: radii within 0.3 % and other differences, two standard deviations
@@ -175,7 +175,7 @@ def watch_trailing(
         as_before = as_before and state.beyond[side] < DEEPEST and not failed[leading]
         if brakes and slips and as_before and state.trailing < RELIEVED:
             state.held_s[side] += dt
-        elif slips or not brakes:
+        elif not brakes or (slips and not (state.held_s[side] > DENIED_S and excess < GROWS)):
             state.held_s[side] = 0.0
         if state.held_s[side] > DENIED_S:
             state.offset[side] += trailing * DENIES * dt * max(excess, 0.0)

@@ -200,7 +200,7 @@ class Watch:
 def test_a_front_wheel_that_the_slip_guard_holds_is_no_measure(params, state, feed, guarded) -> None:
     watch = Watch(params, state, feed)
     watch.guarded[:] = guarded
-    assert (watch.run(WORSE, seconds=1.0) == 1.0) == (guarded[:2] == (1, 1))
+    assert (watch.run(WORSE, seconds=0.3) == 1.0) == (guarded[:2] == (1, 1))
 
 
 @pytest.fixture
@@ -274,6 +274,14 @@ DENIED = [
 def test_a_slip_that_no_relief_changes_is_denied(watch, case, before, since, rear) -> None:
     watch.run(before, seconds=0.15)
     assert rear[0] - 1e-9 <= watch.run(since, seconds=1.0) <= rear[1], case
+
+
+def test_a_denied_slip_that_grows_as_the_car_slows_stays_denied(watch) -> None:
+    """A speed too low by a constant is a share that grows slowly; that of a wheel that locks does not."""
+    watch.run(BEYOND, seconds=1.5)
+    left = [watch.run((-3, -3, -4.5 - more, -4.5 - more)) for more in np.arange(0.1, 2.0, 0.1)]
+    assert min(left) > 0.9
+    assert watch.run((-3, -3, -40, -40), seconds=0.3) == LEAST_TRAILING
 
 
 BESIDE_FAILED = [
