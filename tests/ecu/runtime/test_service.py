@@ -83,6 +83,7 @@ def test_whatever_ends_the_loop_first_the_farewell_then_the_last_words(
     monkeypatch.setattr(service, "prepare", lambda options: session)
     monkeypatch.setattr(service, "configure_logging", lambda: None)
     monkeypatch.setattr(service.signal, "signal", handlers.__setitem__)
+    monkeypatch.setattr(service.signal, "getsignal", lambda number: signal.SIG_DFL)  # under nohup, too
     monkeypatch.setattr(service, "_cycle_until", cycle_until)
     monkeypatch.setattr(service, "send_farewell", farewell)
     monkeypatch.setattr(service, "close_ring", lambda ring, words: done.append(words["by"].partition(":")[0]))
