@@ -18,8 +18,9 @@ import pyarrow.parquet as pq
 
 from ecu import __version__
 from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
-from ecu.contract.signals import CORNERS, without_corner
+from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
+from ecu.watch.foxglove_server import topic_of
 
 SUFFIX: Final = ".mcap"
 _KINDS: Final = {"string": "string", "int8": "integer", "int32": "integer", "uint32": "integer"}
@@ -94,18 +95,12 @@ def _described(field: "pa.Field[Any]") -> tuple[str, str]:
     return _KINDS.get(str(field.type), "number"), unit
 
 
-def _topic_of(column: str) -> tuple[str, str]:
-    """Return the topic of a column and its name there."""
-    stem = without_corner(column)
-    return ("/ecu", column) if stem == column else (f"/corner/{column[-2:]}", stem)
-
-
 def _topics(schema: pa.Schema) -> dict[str, dict[str, tuple[str, str]]]:
     topics: dict[str, dict[str, tuple[str, str]]] = {
         topic: {} for topic in ("/ecu", *(f"/corner/{corner}" for corner in CORNERS))
     }
     for field in schema:
-        topic, name = _topic_of(field.name)
+        topic, name = topic_of(field.name)
         topics[topic][name] = _described(field)
     return topics
 
@@ -121,7 +116,7 @@ def _register(writer: Any, topic: str, names: dict[str, tuple[str, str]]) -> int
 def _row_messages(source: pq.ParquetFile, start_ns: int) -> Iterator[_Message]:
     for group in range(source.num_row_groups):
         table = source.read_row_group(group)
-        places = [(name, *_topic_of(name)) for name in table.column_names]
+        places = [(name, *topic_of(name)) for name in table.column_names]
         columns: dict[str, list[Any]] = {name: table.column(name).to_pylist() for name in table.column_names}
         for row, t in enumerate(columns["t"]):
             content: dict[str, dict[str, Any]] = {}

@@ -206,7 +206,7 @@ def resampling_panel(trips: list[Applications]) -> Panel:
 
 
 def write_page(page: Path, trips: list[Applications], judged: list[Judged], chosen: Judged) -> None:
-    """Write the tables with Figures 8.2, 8.4, 8.5 and 8.8 above them."""
+    """Write the tables with the panels of `dust_panels` above them."""
     picture = page.with_suffix(".svg")
     write_chart(picture, dust_panels(trips, judged, chosen), LEGEND)
     tables = [model_table(judged, chosen), trip_table(trips), spearman_table(trips)]
