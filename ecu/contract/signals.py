@@ -15,6 +15,12 @@ def without_corner(name: str) -> str:
     return name[:-3] if name[-3:] in {f"_{corner}" for corner in CORNERS} else name
 
 
+def topic_of(column: str) -> tuple[str, str]:
+    """Return the topic of a column in MCAP results and live Foxglove, and its name there."""
+    name = without_corner(column)
+    return ("/ecu", column) if name == column else (f"/corner/{column[-2:]}", name)
+
+
 class InputSignal(NamedTuple):
     """Quantity that the ECU reads."""
 

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from ecu.contract.signals import CORNERS, OUTPUT_SIGNALS, without_corner
+from ecu.contract.signals import CORNERS, OUTPUT_SIGNALS, topic_of
 from ecu.errors import UserError
 from ecu.watch.history import COLUMN, COLUMNS, Event, Row
 from ecu.watch.line import faults_of
@@ -28,12 +28,6 @@ UNITS: Final = {
 }
 Log = Callable[[dict[str, Any], int], None]
 """Takes a message and its time [ns]."""
-
-
-def topic_of(column: str) -> tuple[str, str]:
-    """Return the topic of a column and its name there."""
-    name = without_corner(column)
-    return ("/ecu", column) if name == column else (f"/corner/{column[-2:]}", name)
 
 
 def schemas() -> dict[str, dict[str, Any]]:

@@ -4,11 +4,11 @@ import sys
 
 import pytest
 
-from brakelab.results import mcap_file
 from ecu import cli
 from ecu.contract.faults import WHEEL_SPEED_LOST
+from ecu.contract.signals import topic_of
 from ecu.watch import foxglove_server
-from ecu.watch.foxglove_server import Publisher, schemas, topic_of
+from ecu.watch.foxglove_server import Publisher, schemas
 from ecu.watch.history import COLUMNS
 from ecu.watch.watcher import Watcher
 
@@ -61,14 +61,13 @@ def test_events_are_lines_of_a_log_each_once(published):
     assert said == []
 
 
-def test_messages_are_as_their_schemas_and_as_an_mcap_file_has_them(published):
+def test_messages_are_as_their_schemas_in_the_topics_of_an_mcap_file(published):
     one, publisher, said = published
     one.publish(8)
     publisher.turn()
     described = schemas()
     assert all(set(message) <= set(described[topic]["properties"]) for topic, message, _ in said)
     assert described["/corner/fl"]["properties"]["calliper_pressure"]["description"] == "bar"
-    assert mcap_file.topic_of is topic_of
     for column in COLUMNS:
         of_a_corner = column[-3:] in ("_fl", "_fr", "_rl", "_rr")
         place = (f"/corner/{column[-2:]}", column[:-3]) if of_a_corner else ("/ecu", column)

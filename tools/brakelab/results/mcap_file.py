@@ -18,9 +18,8 @@ import pyarrow.parquet as pq
 
 from ecu import __version__
 from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
-from ecu.contract.signals import CORNERS
+from ecu.contract.signals import CORNERS, topic_of
 from ecu.errors import UserError
-from ecu.watch.foxglove_server import topic_of
 
 SUFFIX: Final = ".mcap"
 _KINDS: Final = {"string": "string", "int8": "integer", "int32": "integer", "uint32": "integer"}
