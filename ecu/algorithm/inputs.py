@@ -9,6 +9,7 @@ from ecu.contract.params import PEDAL_POINTS
 from ecu.contract.signals import (
     ABS_ACTIVE,
     ACCELERATOR_POSITION,
+    CALLIPER_PRESSURE,
     DECEL_DEMAND,
     DECEL_DEMAND_VALID,
     ESP_ACTIVE,
@@ -63,6 +64,20 @@ def motor_torque_known(inputs: Record, corner: int) -> bool:
     """Return whether motor torque is reported, or was never above zero: a car without such motors."""
     place = MOTOR_TORQUE + corner
     return usable(inputs, place) or inputs.value[place] == 0.0
+
+
+@kernel
+def share_pressures(params: Record, inputs: Record) -> None:
+    """Give a wheel whose pressure is not received that of another, of its own axle if there is one."""
+    for i in range(CALLIPER_PRESSURE, CALLIPER_PRESSURE + 4):
+        if params.mapped[i] or params.transmit:
+            continue
+        for across in range(1, 4):
+            other = CALLIPER_PRESSURE + ((i - CALLIPER_PRESSURE) ^ across)
+            if params.mapped[other]:
+                inputs.value[i], inputs.new[i] = inputs.value[other], inputs.new[other]
+                inputs.age_ns[i], inputs.verdict[i] = inputs.age_ns[other], inputs.verdict[other]
+                break
 
 
 @kernel

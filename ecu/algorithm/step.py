@@ -73,7 +73,7 @@ from ecu.algorithm.estimation.thesis.slip import RADIUS_START, WHEELS_STATE
 from ecu.algorithm.estimation.thesis.speed import SPEED_STATE
 from ecu.algorithm.estimation.wheel_load import WHEEL_LOAD_STATE
 from ecu.algorithm.hydraulics import HYDRAULICS_STATE, advance_pressures, correct_pressures, slowness
-from ecu.algorithm.inputs import others_brake
+from ecu.algorithm.inputs import others_brake, share_pressures
 from ecu.algorithm.monitoring.accel_error import ACCEL_ERROR_STATE
 from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE
 from ecu.algorithm.monitoring.application import APPLICATION_STATE, update_application
@@ -234,17 +234,17 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     p, s, u, y = params[0], state[0], inputs[0], outputs[0]
     dt = 1e-9 * u.dt_ns
     s.trusted = u
+    share_pressures(p, s.trusted)
     begin_watch(s.witness, dt)
     stuck = correct_flags(p, s.flags, s.witness, s.trusted, s.estimate, s.application.braking != 0, dt)
     u = s.trusted
     faults, contradicted = watch_sensors(p, s, u, dt)
-    contradicted = contradicted or u.e2e_unsure != 0
     faults |= stuck | u.bus_faults | u.e2e_faults | input_faults(p, u)
     mask_implausible(p, s, u)
     hold_pedal(p, s.demand, u)
     faults |= hold_automated(s.demand, u, dt)
     faults |= request_lost(p, u)
-    _estimate(p, s, u, contradicted, dt)
+    _estimate(p, s, u, contradicted or u.e2e_unsure != 0, dt)
     update_discs(p, s.discs, s.learned, u, s.estimate, s.application, dt)
     update_wear(p, s.wear, s.learned, u, s.estimate, s.discs, s.application, dt)
     update_dust(p, s.dust, s.learned, u, s.estimate, s.discs, s.wear, s.application, dt)

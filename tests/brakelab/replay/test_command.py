@@ -338,6 +338,13 @@ WORTHLESS: dict[str, tuple[dict[str, float | None], list[str]]] = {
             "degraded or failed for 87 % of the drive: pressure lost (87 %)",
         ],
     ),
+    "a pressure of the front circuit alone": (
+        {"calliper_pressure_rl": None, "calliper_pressure_rr": None},
+        [
+            "calliper_pressure_rl, calliper_pressure_rr: not mapped; that of another wheel stands for it",
+            NO_SPEED,
+        ],
+    ),
     "no acceleration": (
         {"accel_x": None},
         [

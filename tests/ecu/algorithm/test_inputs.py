@@ -20,6 +20,7 @@ from ecu.algorithm.inputs import (
     pedal_known,
     pedal_to_decel,
     requested_decel,
+    share_pressures,
     usable,
     wheels_mapped,
 )
@@ -28,6 +29,7 @@ from ecu.contract.signals import (
     ACCEL_X,
     ACCELERATOR_POSITION,
     ALIVE,
+    CALLIPER_PRESSURE,
     DECEL_DEMAND,
     DECEL_DEMAND_VALID,
     ESP_ACTIVE,
@@ -212,3 +214,29 @@ def test_a_pedal_is_known_by_position_or_switch(params, feed, position, switch, 
     inputs["verdict"][PEDAL_POSITION], inputs["verdict"][PEDAL_PRESSED] = position, switch
     params[0]["mapped"][PEDAL_POSITION] = mapped
     assert pedal_known(params[0], inputs) == known
+
+
+@pytest.mark.parametrize(
+    ("received", "taken"),
+    [
+        ([1, 1, 1, 1], [0, 1, 2, 3]),
+        ([1, 0, 1, 0], [0, 0, 2, 2]),  # one of each axle
+        ([1, 1, 0, 0], [0, 1, 0, 1]),  # the front circuit alone
+        ([0, 0, 1, 1], [2, 3, 2, 3]),
+        ([1, 0, 0, 1], [0, 0, 3, 3]),  # one of two diagonal circuits has a sensor in front, one behind
+        ([0, 0, 1, 0], [2, 2, 2, 2]),
+        ([0, 0, 0, 0], [0, 1, 2, 3]),
+    ],
+)
+def test_a_wheel_without_a_pressure_takes_that_of_another(params, feed, received, taken) -> None:
+    car, bars = params[0], np.array([10.0, 20.0, 30.0, 40.0])
+    four = slice(CALLIPER_PRESSURE, CALLIPER_PRESSURE + 4)
+    for armed in (0, 1):
+        car["transmit"], car["mapped"][four] = armed, received
+        inputs = feed(calliper_pressure=bars)[0]
+        inputs["new"][four] = inputs["verdict"][four] = inputs["age_ns"][four] = np.arange(4) + 1
+        share_pressures(car, inputs)
+        expected = np.arange(4) if armed else np.array(taken)
+        assert (inputs["value"][four] == bars[expected]).all()
+        for name in ("new", "verdict", "age_ns"):
+            assert (inputs[name][four] == expected + 1).all(), name

@@ -158,6 +158,8 @@ def _cause(found: Findings, place: int) -> str:
     known, signal = found.freshness[place], INPUT_SIGNALS[place]
     taken, outside, invalid = int(known["taken"]), int(known["outside"]), int(known["invalid"])
     if not taken + outside + invalid:
+        if CALLIPER_PRESSURE <= place < CALLIPER_PRESSURE + len(CORNERS) and not found.mapped[place]:
+            return "not mapped; that of another wheel stands for it"
         if found.reception is None:
             return "no sample in the whole log; fill this column"
         return "no sample in the whole log; check its sender, or map it"
