@@ -1,9 +1,9 @@
 """Brake applications: detection of their start and end.
 
-An application starts when a calliper pressure has been 1 bar above the push-out pressure for 0.1 s and ends
-when all have been below for 0.1 s. With 1.8 bar of sensor noise single samples of a released brake often
-cross the threshold, so "below for 0.1 s" is judged by the mean of those 0.1 s. A pressure that is not usable
-neither starts nor prolongs an application.
+An application starts when a calliper pressure has been 1 bar above the push-out pressure for 0.1 s, counted
+from the learned zero of its sensor, and ends when all have been below for 0.1 s. With 1.8 bar of sensor noise
+single samples of a released brake often cross the threshold, so "below for 0.1 s" is judged by the mean of
+those 0.1 s. A pressure that is not usable neither starts nor prolongs an application.
 
 A held sample is no new evidence: two samples of a sensor with 20 Hz fill 0.1 s, and noise would start an
 application every second or so. So the samples above the threshold must also add up to ten times the least
@@ -13,6 +13,7 @@ excess: ten that are just above it, as at 100 Hz, or fewer of a greater pressure
 import numpy as np
 
 from ecu.algorithm.inputs import fresh, usable
+from ecu.contract.params import BAR
 from ecu.contract.signals import CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
 
@@ -35,13 +36,23 @@ APPLICATION_STATE = np.dtype(
 
 
 @kernel
-def update_application(params: Record, state: Record, inputs: Record, dt: float) -> None:
-    """Overwrite whether the brakes are applied, from the measured pressures."""
+def update_application(params: Record, state: Record, inputs: Record, zero: Record, dt: float) -> None:
+    """Overwrite whether the brakes are applied, from the measured pressures.
+
+    Args:
+        params: `PARAMS`.
+        state: `APPLICATION_STATE`, overwritten.
+        inputs: `INPUTS`.
+        zero: of the pressure sensors [bar], shape (4,).
+        dt: time since the last cycle [s].
+    """
     long_enough, applied = False, False
     state.place = (state.place + 1) % WINDOW
     for i in range(4):
         place = CALLIPER_PRESSURE + i
-        above = 1e5 * inputs.value[place] - params.push_out_pressure[i] if usable(inputs, place) else 0.0
+        above = 0.0
+        if usable(inputs, place):
+            above = BAR * (inputs.value[place] - zero[i]) - params.push_out_pressure[i]
         state.above[i] = state.above[i] + 1 if above > MARGIN else 0
         if state.above[i] == 0:
             state.shown[i] = 0.0

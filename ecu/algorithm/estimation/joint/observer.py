@@ -61,11 +61,18 @@ from ecu.algorithm.estimation.joint.sliding import (
     watch_tyres,
 )
 from ecu.algorithm.estimation.joint.snapshot import restore_snapshot, save_newer_snapshot, save_snapshot
-from ecu.algorithm.estimation.joint.speed import LOST_S, bridge_gap, reverses, speed_is_wrong, start_speed
+from ecu.algorithm.estimation.joint.speed import (
+    DRIVEN_ACCEL,
+    LOST_S,
+    bridge_gap,
+    reverses,
+    speed_is_wrong,
+    start_speed,
+)
 from ecu.algorithm.estimation.joint.wheel import APPLIED, brake_torque, drive_opposes, unknown_share
 from ecu.algorithm.estimation.joint.wheel_speed import correct_by_wheels
 from ecu.algorithm.estimation.joint.window import close_window, compare_wheels, gather, open_window
-from ecu.algorithm.estimation.zero import FREE, settle_zero
+from ecu.algorithm.estimation.zero import FREE, LARGEST_ZERO, settle_zero
 from ecu.algorithm.inputs import (
     LEAST_REQUEST,
     driver_accelerates,
@@ -191,7 +198,8 @@ def update_joint(
     _note_measured(state, motion.measured != 0, dt)
     if bridge_gap(params, state, inputs, motion, dt):
         return
-    state.released = 1 if not braking and _released(params, state, inputs) else 0
+    free = not braking and _released(params, state, inputs)
+    state.released = 1 if free or _pulls(params, state) else 0
     gather(params, state, inputs, motion, load, hydraulics, state.released != 0, dt)
     if braking and usable(inputs, ACCEL_X):
         share_force(params, state, inputs, motion.accel_x, load)
@@ -217,6 +225,17 @@ def _released(params: Record, state: Record, inputs: Record) -> bool:
     for i in range(4):
         total += state.smooth_pressure[i]
     return total < 4.0 * FREE
+
+
+@kernel
+def _pulls(params: Record, state: Record) -> bool:
+    """Return whether a car that others brake speeds up: pressures near zero are then the sensors' own."""
+    if params.transmit or state.unmeasured_s > 0.0 or not state.smooth_accel > DRIVEN_ACCEL:
+        return False
+    highest = 0.0
+    for i in range(4):
+        highest = max(highest, state.smooth_pressure[i])
+    return highest < LARGEST_ZERO
 
 
 @kernel

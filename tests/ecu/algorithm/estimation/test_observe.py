@@ -50,6 +50,14 @@ def test_every_observer_learns_what_the_pressure_sensors_read_at_rest(params, fe
     assert found == pytest.approx(bars * 600 / 700, abs=0.03)
 
 
+@pytest.mark.parametrize(("armed", "known"), [(0, True), (1, False)])
+def test_a_bystander_learns_zeros_that_look_like_a_brake_application(params, feed, armed, known) -> None:
+    """The car speeds up, so nothing brakes it; where this ECU brakes, it may be its own pressure."""
+    params[0]["transmit"] = armed
+    found = roll(params, feed, JOINT, 6.0, (2.0,) * 4, accel_x=1.0, accelerator_position=30.0)
+    assert (np.abs(found["pressure_zero"] - 2.0) < 0.4).all() == known
+
+
 @pytest.mark.parametrize("observer", OBSERVERS)
 def test_brake_torque_is_without_the_pressure_zero(params, feed, observer: int) -> None:
     """(A.19) by hand: 30 bar read by sensors with a known zero of 1.2 bar."""

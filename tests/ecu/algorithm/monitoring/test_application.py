@@ -16,7 +16,7 @@ class Brake:
 
     def __init__(self, params, feed) -> None:
         self.params, self.feed, self.inputs = params[0], feed, feed()
-        self.state = np.zeros(1, APPLICATION_STATE)[0]
+        self.state, self.zero = np.zeros(1, APPLICATION_STATE)[0], np.zeros(4)
 
     def hold(self, pressure, seconds: float, every: int = 1) -> list[tuple[bool, bool, bool]]:
         """Return (braking, started, ended) of each cycle; a sample arrives `every` so many."""
@@ -25,7 +25,7 @@ class Brake:
             self.inputs["new"] = k % every == 0
             if k % every == 0:
                 self.feed(self.inputs, calliper_pressure=pressure() if callable(pressure) else pressure)
-            update_application(self.params, self.state, self.inputs[0], DT)
+            update_application(self.params, self.state, self.inputs[0], self.zero, DT)
             rows.append(tuple(bool(self.state[k]) for k in ("braking", "started", "ended")))
         return rows
 
@@ -54,6 +54,13 @@ def test_what_is_an_application(brake: Brake, case, pressure, starts) -> None:
     rows = brake.hold(pressure, 1.0)
     assert rows[-1][0] == starts, case
     assert sum(row[1] for row in rows) == starts, case
+
+
+@pytest.mark.parametrize("zero", [-2.0, 2.0])
+def test_a_pressure_counts_from_the_zero_of_its_sensor(brake: Brake, zero: float) -> None:
+    brake.zero[:] = zero
+    assert not any(row[0] for row in brake.hold(zero + PUSH_OUT + 0.99, 1.0))
+    assert brake.hold(zero + PUSH_OUT + 1.05, 1.0)[-1][0]
 
 
 def test_it_starts_a_tenth_of_a_second_after_a_firm_pressure(brake: Brake) -> None:

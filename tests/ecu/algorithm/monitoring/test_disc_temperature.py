@@ -264,7 +264,7 @@ def test_noise_of_released_brakes_does_not_heat(discs: Discs) -> None:
     s["estimate"]["speed"] = 30.0
     for _ in range(20_000):
         discs.feed(discs.inputs, calliper_pressure=0.5 + 1.8 * random.standard_normal(4), wheel_speed=80.0)
-        update_application(discs.p, s["application"], discs.inputs[0], 0.01)
+        update_application(discs.p, s["application"], discs.inputs[0], np.zeros(4), 0.01)
         update_pressure(discs.p, s["friction"], s["estimate"]["mu"], np.zeros(4), discs.inputs[0], 0.01)
         s["estimate"]["brake_torque"] = s["friction"]["torque"]
         discs.step()
