@@ -29,6 +29,7 @@ ESTIMATE = np.dtype(
         ("mass", "f8"),  # kg
         ("accel_bias", "f8"),  # of the accelerometer [m/s^2]
         ("overrun", "f8"),  # unreported engine drag while braking, over mass [m/s^2]
+        ("sigma_overrun", "f8"),  # m/s^2, of it and of a mean's noise; NaN: only learned where others brake
         ("grip_limit", "f8"),  # ceiling of the brakes' deceleration [m/s^2]; NaN: unknown
         ("sigma_grip_limit", "f8"),  # m/s^2
         ("grip_knee", "f8"),  # exponent of the bend towards it; NaN: the ECU brakes
@@ -69,7 +70,7 @@ ESTIMATE = np.dtype(
 UNITS = {
     **dict.fromkeys(("speed", "lateral_speed"), "m/s"),
     **dict.fromkeys(("accel_x", "accel_x_model", "accel_y", "accel_bias", "overrun"), "m/s^2"),
-    **dict.fromkeys(("grip_limit", "sigma_grip_limit"), "m/s^2"),
+    **dict.fromkeys(("sigma_overrun", "grip_limit", "sigma_grip_limit"), "m/s^2"),
     "yaw_rate": "rad/s",
     "steering": "rad",
     "mass": "kg",

@@ -176,6 +176,9 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("torque_demand", "N m", True, ""),  # of the linings: that of the pressure demand
     OutputSignal("pressure_lateness_rise", "s", False, ""),  # of pressures behind their demands, as learned
     OutputSignal("pressure_lateness_fall", "s", False, ""),
+    OutputSignal(
+        "sigma_overrun", "m/s^2", False, ""
+    ),  # of `overrun` and of the noise of an application's mean
 )
 
 DEMANDS: Final = {

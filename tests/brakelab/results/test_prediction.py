@@ -175,6 +175,8 @@ def test_sigma_is_that_of_friction_and_of_motors(share: float, relative: float) 
     of_motors = P["sigma_motor_torque"] * (150.0 / P["wheel_radius"]).sum() / P["mass"]
     both = np.hypot(relative * linings(), of_motors)
     assert judged(rows).sigma_specific_force == pytest.approx(both, rel=1e-9)
+    column(rows, "sigma_overrun")[:] = 2.0 * both
+    assert judged(rows).sigma_specific_force == pytest.approx(2.0 * both, rel=1e-9)
 
 
 @pytest.mark.parametrize(("mode", "learned"), [(NOMINAL, 0), (HOLDING, 1), (FAULT, 0)])

@@ -16,7 +16,8 @@ inertia. f is a specific force, the reading of an accelerometer, so it is free o
 b is the accelerometer's zero as known before. `specific_force_configured` is the first with the configured
 friction and mass and without overrun: the prediction of an ECU without learning.
 
-The standard deviation is that of the force of all linings at equal pressures, and of the motor torque.
+The standard deviation is that of the force of all linings at equal pressures and of the motor torque, and at
+least that of the overrun, which is no smaller in a light application.
 """
 
 from collections.abc import Sequence
@@ -157,6 +158,7 @@ def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
     if np.isnan(relative):  # of one wheel's observers: taken as one error common to all
         relative = float(np.mean(corners(before, "sigma_mu_b") / corners(before, "mu_b")))
     sigma = float(np.hypot(relative * brakes, p["sigma_motor_torque"] * motors))
+    sigma = max(sigma, float(np.nan_to_num(before[OUTPUT["sigma_overrun"]])))
     felt = rows[:, OUTPUT["accel_x_road"]] - np.nan_to_num(before[OUTPUT["accel_x_zero"]])
     return Prediction(
         decel, brakes + rest, sigma, configured_brakes + configured_rest, rest, configured_rest,
