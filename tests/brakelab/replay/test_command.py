@@ -348,7 +348,7 @@ WORTHLESS: dict[str, tuple[dict[str, float | None], list[str]]] = {
     "no acceleration": (
         {"accel_x": None},
         [
-            "accel_x: no sample in the whole log; fill this column",
+            "accel_x: not mapped; the change of speed stands for it",
             NO_SPEED,
             "degraded or failed for 87 % of the drive: IMU lost (87 %)",
         ],

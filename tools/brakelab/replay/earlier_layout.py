@@ -84,6 +84,11 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "late",
         "late_known",
         "slides",
+        "speeds",
+        "speed_sum",
+        "speed_sum_at",
+        "last_speed",
+        "last_speed_at",
     ),
 }
 

@@ -57,6 +57,9 @@ HELPFUL: Final = (
     (Group("steering_angle", (STEERING_ANGLE,)), "cornering forces of the front axle are not separated"),
 )
 """Inputs that a car may lack, and the estimates that suffer without them."""
+STAND_IN: Final = {ACCEL_X: "the change of speed"} | dict.fromkeys(
+    range(CALLIPER_PRESSURE, CALLIPER_PRESSURE + len(CORNERS)), "that of another wheel"
+)
 NO_PRESSURE: Final = (
     "no calliper pressure, so friction cannot be estimated; map the pressures, or a brake torque "
     "in their place (docs/signal-maps.md)"
@@ -158,8 +161,8 @@ def _cause(found: Findings, place: int) -> str:
     known, signal = found.freshness[place], INPUT_SIGNALS[place]
     taken, outside, invalid = int(known["taken"]), int(known["outside"]), int(known["invalid"])
     if not taken + outside + invalid:
-        if CALLIPER_PRESSURE <= place < CALLIPER_PRESSURE + len(CORNERS) and not found.mapped[place]:
-            return "not mapped; that of another wheel stands for it"
+        if not found.mapped[place] and place in STAND_IN:
+            return f"not mapped; {STAND_IN[place]} stands for it"
         if found.reception is None:
             return "no sample in the whole log; fill this column"
         return "no sample in the whole log; check its sender, or map it"

@@ -55,11 +55,7 @@ from ecu.algorithm.estimation.joint.prior import (
     walk,
 )
 from ecu.algorithm.estimation.joint.reference import correct_by_reference
-from ecu.algorithm.estimation.joint.sliding import (
-    HOLD_S,
-    share_force,
-    watch_tyres,
-)
+from ecu.algorithm.estimation.joint.sliding import HOLD_S, share_force, watch_tyres
 from ecu.algorithm.estimation.joint.snapshot import restore_snapshot, save_newer_snapshot, save_snapshot
 from ecu.algorithm.estimation.joint.speed import (
     DRIVEN_ACCEL,
@@ -232,10 +228,9 @@ def _pulls(params: Record, state: Record) -> bool:
     """Return whether a car that others brake speeds up: pressures near zero are then the sensors' own."""
     if params.transmit or state.unmeasured_s > 0.0 or not state.smooth_accel > DRIVEN_ACCEL:
         return False
-    highest = 0.0
-    for i in range(4):
-        highest = max(highest, state.smooth_pressure[i])
-    return highest < LARGEST_ZERO
+    above = state.smooth_pressure
+    near: bool = max(above[0], above[1], above[2], above[3]) < LARGEST_ZERO
+    return near
 
 
 @kernel
@@ -284,12 +279,13 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     if state.unmeasured_s >= LOST_S and braking and moving:
         _drift_by_linings(params, state, time)
     _watch_release(state, braking)
+    balanced = w.balanced != 0 and params.mapped[ACCEL_X] != 0  # dv/dt is what the wheels say already
     learning = moving and state.hold_s <= 0.0 and w.motor_known != 0
     learning = learning and not _learning_forbidden(params, state, inputs, braking)
     if not braking:
         learning = learning and abs(w.across) < STRAIGHT and state.released != 0
     if learning and not braking and motors <= MOTORS:
-        learning = w.balanced and abs(predict_balance(params, state, False)) < UNEXPLAINED
+        learning = balanced and abs(predict_balance(params, state, False)) < UNEXPLAINED
     _choose_free(state, braking, motors > MOTORS, learning)
     before = x[V]
     for place in range(RATIOS):
@@ -314,7 +310,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
     if no_wheel_known(inputs):
         state.free[OVERRUN] = 0  # the wheels' slip tells it from the linings
         seen = linings_tell(params, state, braking)
-    if seen and learning and w.balanced and (braking or w.motor_reported):
+    if seen and learning and balanced and (braking or w.motor_reported):
         correct_by_balance(params, state, braking)
     state.pressed = max(abs(pressure_change(state, 0)), abs(pressure_change(state, 2)))
     state.last_accel, state.last_smooth_accel = w.accel, state.smooth_accel

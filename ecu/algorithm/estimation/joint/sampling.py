@@ -4,6 +4,9 @@ A balance of signals measured at different times is wrong during any change, and
 its period on average. Samples of a window count as one, at their mean time; every signal is interpolated
 between its last two such means at the oldest of the last times, never extrapolated. Where all signals arrive
 in every cycle, that is the middle of the window, without interpolation.
+
+Where no accelerometer is mapped, the change of speed from window to window stands for it, halfway between
+their times: over a brake application its mean is exact, but for a slope.
 """
 
 import numpy as np
@@ -25,11 +28,16 @@ SAMPLING_STATE = np.dtype(
         ("before_at", "f8", (CHANNELS,)),
         ("samples", "i8", (CHANNELS,)),  # number of samples in `value`
         ("common", "f8"),  # time of the last balance [s]
+        ("speeds", "i8"),  # samples of the speed in this window
+        ("speed_sum", "f8"),  # of them [m/s]
+        ("speed_sum_at", "f8"),  # s
+        ("last_speed", "f8"),  # mean of the last window that had samples [m/s]
+        ("last_speed_at", "f8"),  # its time [s]
     ],
     align=True,
 )
 
-OLDEST_S = 0.5  # between samples that are compared
+LEAST_STEP_S, OLDEST_S = 0.001, 0.5  # between samples that are compared
 LEAST_ADVANCE_S = 0.02  # advance of the common time that allows another balance
 
 
@@ -38,6 +46,7 @@ def open_sampling(state: Record) -> None:
     """Begin a window."""
     for i in range(CHANNELS):
         state.sum[i], state.sum_at[i], state.count[i] = 0.0, 0.0, 0
+    state.speed_sum, state.speed_sum_at, state.speeds = 0.0, 0.0, 0
 
 
 @kernel
@@ -46,6 +55,26 @@ def add_sample(state: Record, i: int, value: float, age: float) -> None:
     state.sum[i] += value
     state.sum_at[i] += state.now - age
     state.count[i] += 1
+
+
+@kernel
+def add_speed(state: Record, speed: float, age: float) -> None:
+    """Add a speed of the car [m/s] that is `age` [s] old."""
+    state.speed_sum += speed
+    state.speed_sum_at += state.now - age
+    state.speeds += 1
+
+
+@kernel
+def accelerate_by_speed(state: Record) -> None:
+    """Add the change of the speed since the last window that had one as a sample of the acceleration."""
+    if state.speeds == 0:
+        return
+    speed, at = state.speed_sum / state.speeds, state.speed_sum_at / state.speeds
+    time = at - state.last_speed_at
+    if LEAST_STEP_S < time < OLDEST_S:
+        add_sample(state, ACCEL, (speed - state.last_speed) / time, state.now - at + 0.5 * time)
+    state.last_speed, state.last_speed_at = speed, at
 
 
 @kernel
@@ -62,7 +91,7 @@ def close_sampling(state: Record) -> None:
 def slope(state: Record, i: int) -> float:
     """Return the change of channel `i` per second between its last two means; 0 where they are far apart."""
     time = state.at[i] - state.before_at[i]
-    return (state.value[i] - state.before[i]) / time if 0.001 < time < OLDEST_S else 0.0
+    return (state.value[i] - state.before[i]) / time if LEAST_STEP_S < time < OLDEST_S else 0.0
 
 
 @kernel

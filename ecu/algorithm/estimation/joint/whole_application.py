@@ -37,6 +37,7 @@ from ecu.algorithm.estimation.joint.wheel import (
 )
 from ecu.algorithm.estimation.joint.window import COPIES
 from ecu.algorithm.inputs import wheels_mapped
+from ecu.contract.signals import ACCEL_X
 from ecu.jit import Record, kernel
 
 SCALE, GRIP, OVERRUN = range(3)
@@ -162,7 +163,7 @@ def _hand_over_scale(state: Record, joint: Record) -> None:
 def begin_whole(params: Record, state: Record, joint: Record) -> None:
     """Begin an application."""
     apart = wheels_mapped(params) and joint.speed_copies <= COPIES and joint.sliding < 4
-    alone = not (apart and torques_measured(params, joint))
+    alone = not (apart and torques_measured(params, joint) and params.mapped[ACCEL_X])
     if state.alone and not alone:
         _hand_over_scale(state, joint)
     state.alone = 1 if alone else 0
@@ -208,7 +209,7 @@ def add_to_whole(params: Record, state: Record, joint: Record) -> None:
     share = torque_share(state)
     if (
         not (w.balanced and held)
-        or joint.unmeasured_s > LONGEST_STEP_S
+        or (joint.unmeasured_s > LONGEST_STEP_S and params.mapped[ACCEL_X])
         or drive_opposes(params, joint, share)
     ):
         return

@@ -10,7 +10,9 @@ from ecu.algorithm.estimation.joint.layout import BIAS, DELAY, SLOPE, V
 from ecu.algorithm.estimation.joint.motors import follow_motors
 from ecu.algorithm.estimation.joint.sampling import (
     ACCEL,
+    accelerate_by_speed,
     add_sample,
+    add_speed,
     advance_common_time,
     at_common_time,
     close_sampling,
@@ -18,7 +20,7 @@ from ecu.algorithm.estimation.joint.sampling import (
 )
 from ecu.algorithm.estimation.zero import note_rest
 from ecu.algorithm.hydraulics import follows_demand
-from ecu.algorithm.inputs import current, fresh, motor_torque, motor_torque_known, usable
+from ecu.algorithm.inputs import current, fresh, motor_torque, motor_torque_known, usable, wheels_mapped
 from ecu.algorithm.lag import lag_gain
 from ecu.algorithm.vehicle import corner_speed, sin_steering
 from ecu.contract.params import BAR, GRAVITY
@@ -122,6 +124,7 @@ def gather(
     turning = motion.yaw_rate * x[V]  # a bend shows in both, a bank or a zero in one alone
     w.across += (motion.accel_y if abs(motion.accel_y) < abs(turning) else turning) / GRAVITY
     w.lateral += front_lateral * sin_steering(motion)
+    fastest, age = -1.0, 0.0
     for i in range(4):
         w.load[i] += load[i]
         w.motor[i] += motor_torque(inputs, i)
@@ -135,6 +138,8 @@ def gather(
             w.omega[i] += value[place]
             w.ground[i] += corner_speed(params, motion, x[V] - 1e-9 * inputs.age_ns[place] * change, i)
             w.omega_samples[i] += 1
+            if abs(value[place]) * params.wheel_radius[i] > fastest:
+                fastest, age = abs(value[place]) * params.wheel_radius[i], 1e-9 * inputs.age_ns[place]
         place = CALLIPER_PRESSURE + i
         push_out = params.push_out_pressure[i] / BAR
         if fresh(inputs, place):
@@ -152,6 +157,10 @@ def gather(
         w.reference += value[place] - (x[V] - delay * change)
         w.reference_change += change
         w.reference_samples += 1
+        if not wheels_mapped(params):
+            fastest, age = value[place], delay
+    if fastest >= 0.0 and not params.mapped[ACCEL_X]:
+        add_speed(state.sampling, fastest, age)
 
 
 @kernel
@@ -159,6 +168,8 @@ def close_window(params: Record, state: Record, hydraulics: Record) -> None:
     """Turn the sums into means."""
     w = state.window
     n = w.cycles
+    if not params.mapped[ACCEL_X]:
+        accelerate_by_speed(state.sampling)
     close_sampling(state.sampling)
     w.balanced = 1 if advance_common_time(state.sampling) else 0
     w.common_accel = at_common_time(state.sampling, ACCEL)

@@ -9,7 +9,9 @@ from ecu.algorithm.estimation.joint.sampling import (
     LEAST_ADVANCE_S,
     OLDEST_S,
     SAMPLING_STATE,
+    accelerate_by_speed,
     add_sample,
+    add_speed,
     advance_common_time,
     at_common_time,
     close_sampling,
@@ -124,3 +126,28 @@ def test_a_window_without_samples_keeps_the_last_mean() -> None:
         close_sampling(state)
     assert (state["value"][1], state["samples"][1]) == (4.0, 2)
     assert state["at"][1] == pytest.approx(1.5 * DT)
+
+
+@pytest.mark.parametrize(
+    ("rate", "age", "step"), [(100.0, 0.0, 0.0), (20.0, 0.2, 1 / 3.6), (10.0, 0.0, 0.0), (3.0, 0.1, 0.0)]
+)
+def test_the_change_of_speed_stands_for_an_accelerometer(rate: float, age: float, step: float) -> None:
+    """v = 30 - t^2: of a(t) = -2 t nothing is lost at its time, of a speed in steps nothing in the mean."""
+    state, rows, every = np.zeros(1, SAMPLING_STATE)[0], [], round(1.0 / (rate * DT))
+    for k in range(1, round(4.0 / DT) + 1):
+        if k % WINDOW == 1:
+            open_sampling(state)
+        state["now"] += DT
+        if k % every == 0:
+            speed = 30.0 - (k * DT - age) ** 2
+            add_speed(state, round(speed / step) * step if step else speed, age)
+        if k % WINDOW == 0:
+            accelerate_by_speed(state)
+            rows.append((state["count"][ACCEL], state["sum"][ACCEL], state["sum_at"][ACCEL]))
+            close_sampling(state)
+    count, accel, at = np.array([row for row in rows if row[0]][1:]).T
+    assert (count == 1).all()
+    error = accel + 2.0 * at
+    assert abs(error.mean()) < 0.1
+    assert step or np.abs(error).max() < 1e-6
+    assert len(at) > 0.8 * min(rate, 20.0) * 4.0 - 3

@@ -44,6 +44,7 @@ from ecu.algorithm.estimation.joint.whole_application import (
 )
 from ecu.algorithm.estimation.joint.window import COPIES
 from ecu.contract.records import LEARNED
+from ecu.contract.signals import ACCEL_X
 
 BAR, GRAVITY, WINDOW_S = 1e5, 9.81, 0.05
 SPEED = 30.0  # m/s
@@ -280,6 +281,17 @@ def test_windows_teach_where_all_torques_and_each_wheel_are_measured(
     begin_whole(bystander.params, bystander.state, bystander.joint)
     assert bool(bystander.state["alone"]) == alone
     assert bystander.state["knee"] == knee
+
+
+def test_windows_teach_nothing_where_no_accelerometer_is_mapped(bystander: Bystander) -> None:
+    """The change of speed that stands for it is what the wheels say already."""
+    bystander.params["mapped"], bystander.params["sigma_motor_torque"] = 1, 0.0
+    bystander.joint["speed_copies"], bystander.joint["differs"] = -1, 1
+    bystander.joint["motors"]["samples"] = 1
+    for mapped in (1, 0):
+        bystander.params["mapped"][ACCEL_X] = mapped
+        begin_whole(bystander.params, bystander.state, bystander.joint)
+        assert bool(bystander.state["alone"]) == (not mapped)
 
 
 def test_windows_go_on_from_what_whole_applications_have_learned(bystander: Bystander) -> None:
