@@ -10,7 +10,7 @@ L' is the deceleration that the linings would give; f is the specific force less
 torques. Where the torques of the drive and of each brake are known and wheels are measured one by one, mu_i
 is the friction as learned window by window, s next to 1. Elsewhere windows teach nothing: mu_i is the
 configured friction, or what was learned where they did. The bend stands for wheels that reach their limit one
-after the other: wide (n = 2.5, close to a tanh), sharper (n = 4) where windows know the linings. States are
+after the other: wide (n = 2.5, close to a tanh) where they have one speed, else sharper (n = 4). States are
 the logarithm of s, that of the ceiling c over `CEILING`, and the unreported drag o, which includes the
 accelerometer's zero where no window teaches it, and is next to none where windows teach: an extended Kalman
 filter, corrected once an application. An innovation beyond `GATE` standard deviations counts with a variance
@@ -44,7 +44,7 @@ SCALE, GRIP, OVERRUN = range(3)
 CEILING = 14.0  # m/s^2: a first braking at 12 must be possible before any was seen
 PRIOR_MEAN = np.array([0.0, 0.0, 0.2])  # the drag in m/s^2
 PRIOR = np.array([0.25, 0.4, 0.5])  # standard deviations: an engine drags by 0.1 to 1 m/s^2
-STEP = np.array([0.04, 0.03, 0.03])  # between applications
+STEP = np.array([0.05, 0.03, 0.03])  # between applications
 # Priors of scale and drag [m/s^2] beside windows, which teach nearly all; their step.
 BESIDE, BESIDE_DRAG, BESIDE_STEP = 0.03, 0.05, 0.006
 PAUSE = np.array([0.03, 0.15, 0.1])  # of unknown length: rain, another road, another day
@@ -59,7 +59,7 @@ ONSET_S = 0.25  # callipers and accelerometer lag behind the pressure
 LEAST_S = 0.3  # of an application that is learned from
 LEAST_DECEL, LEAST_TOTAL = 0.8, 1.5  # m/s^2, of linings, or of the car: a light braking tells the drag
 LONGEST_STEP_S = 0.5  # between samples that are compared
-KNEE, WINDOWS_KNEE = 2.5, 4.0  # n
+ONE_SPEED_KNEE, WHEELS_KNEE = 2.5, 4.0  # n
 BENDS = 0.7  # of the ceiling, beyond which windows no longer teach friction
 USUAL = 6.0  # m/s^2, of the linings, before any application
 
@@ -93,7 +93,7 @@ WHOLE_STATE = np.dtype(
 @kernel
 def restore_whole(state: Record, learned: Record) -> None:
     """Restore learned states, less certain by a pause; use the prior where nothing was learned."""
-    state.usual, state.knee = USUAL, KNEE
+    state.usual, state.knee = USUAL, ONE_SPEED_KNEE
     forget_whole(state)
     if learned.whole_covariance[0] == 0.0:
         return
@@ -167,7 +167,7 @@ def begin_whole(params: Record, state: Record, joint: Record) -> None:
     if state.alone and not alone:
         _hand_over_scale(state, joint)
     state.alone = 1 if alone else 0
-    state.knee = KNEE if alone else WINDOWS_KNEE
+    state.knee = WHEELS_KNEE if apart else ONE_SPEED_KNEE
     state.bent = 0
     state.common = joint.sampling.common
     state.age_s = state.time = state.measured = state.expected = state.linings = state.total = 0.0
