@@ -281,7 +281,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
 
 @kernel
 def _estimate(p: Record, s: Record, u: Record, contradicted: bool, dt: float) -> None:
-    update_application(p, s.application, u, s.estimate.pressure_zero, dt)
+    update_application(p, s.application, u, s.estimate.pressure_at_rest, dt)
     if s.application.ended:
         keep_application(p, s)
         learn_start(s.control, s.estimate, s.learned)

@@ -1,7 +1,7 @@
 """Brake applications: detection of their start and end.
 
 An application starts when a calliper pressure has been 1 bar above the push-out pressure for 0.1 s, counted
-from the learned zero of its sensor, and ends when all have been below for 0.1 s. With 1.8 bar of sensor noise
+from what its sensor reads at rest, and ends when all have been below for 0.1 s. With 1.8 bar of sensor noise
 single samples of a released brake often cross the threshold, so "below for 0.1 s" is judged by the mean of
 those 0.1 s. A pressure that is not usable neither starts nor prolongs an application.
 
@@ -36,14 +36,14 @@ APPLICATION_STATE = np.dtype(
 
 
 @kernel
-def update_application(params: Record, state: Record, inputs: Record, zero: Record, dt: float) -> None:
+def update_application(params: Record, state: Record, inputs: Record, at_rest: Record, dt: float) -> None:
     """Overwrite whether the brakes are applied, from the measured pressures.
 
     Args:
         params: `PARAMS`.
         state: `APPLICATION_STATE`, overwritten.
         inputs: `INPUTS`.
-        zero: of the pressure sensors [bar], shape (4,).
+        at_rest: what released brakes read [bar], shape (4,).
         dt: time since the last cycle [s].
     """
     long_enough, applied = False, False
@@ -52,7 +52,7 @@ def update_application(params: Record, state: Record, inputs: Record, zero: Reco
         place = CALLIPER_PRESSURE + i
         above = 0.0
         if usable(inputs, place):
-            above = BAR * (inputs.value[place] - zero[i]) - params.push_out_pressure[i]
+            above = BAR * (inputs.value[place] - at_rest[i]) - params.push_out_pressure[i]
         state.above[i] = state.above[i] + 1 if above > MARGIN else 0
         if state.above[i] == 0:
             state.shown[i] = 0.0
