@@ -3,7 +3,8 @@
     -a  ~  sum of the callipers of  2 A_k r_eff mu_nominal (p - p_0) / (m r)  +  motors
 
 Friction may be half or nearly twice the nominal one, so that only a scale beyond shows, also in the brakings
-that road and tyres do not limit; a wrong scale of one calliper shows against the other side of its axle
+that road and tyres do not limit, and contradicts where the mean is beyond as well: friction that falls with
+pressure tilts the line; a wrong scale of one calliper shows against the other side of its axle
 (`sides`). Front and rear are exchanged if the rear wheels would have to bear more than the front ones for
 their load, and would not if they were exchanged: no car is built so.
 """
@@ -76,10 +77,11 @@ def judge_pressures(series: InputSeries, car: Car, change: Vector, rows: Rows) -
         return Pressures([f"{flaw}; is it another signal?"], [], checked)
     clipped = clipped_pressures(series, change, rows)
     sides = Sides([], []) if clipped else judge_sides(series, car, pressures, pressed)
-    lines = sides.contradictions + _unit(series, car, pressures - rest, change, rows)
+    unit = _unit(series, car, pressures - rest, change, rows)
+    lines = sides.contradictions + unit.contradictions
     if not sides.differ:
         lines += _axles(pressures - rest, change, rows, car)
-    return Pressures(lines, sides.flaws + ([clipped] if clipped else []), checked)
+    return Pressures(lines, sides.flaws + unit.flaws + ([clipped] if clipped else []), checked)
 
 
 def _axles(pressures: Vector, change: Vector, rows: Rows, car: Car) -> list[str]:
@@ -105,9 +107,10 @@ def _axles(pressures: Vector, change: Vector, rows: Rows, car: Car) -> list[str]
     return [f"calliper_pressure_*: front and rear are exchanged: {reason}; exchange them"]
 
 
-def _unit(series: InputSeries, car: Car, pressures: Vector, change: Vector, rows: Rows) -> list[str]:
+def _unit(series: InputSeries, car: Car, pressures: Vector, change: Vector, rows: Rows) -> Pressures:
+    nothing = Pressures([], [], [])
     if car.brakes is None:
-        return []
+        return nothing
     motors = series.corners("motor_torque")
     others = OVERRUN if motors is None else OVERRUN + motors @ car.brakes.decel_per_torque
     total = pressures.sum(axis=1)
@@ -117,10 +120,11 @@ def _unit(series: InputSeries, car: Car, pressures: Vector, change: Vector, rows
     line = fit(linings, decel, applied)
     least, most = line.span
     if line.correlation < TURNED or (least <= FRICTION and most >= 1.0 / FRICTION):
-        return []
+        return nothing
     free = fit(linings, decel, applied & (decel < FREE * np.percentile(decel[applied], 95))).span
     if 1.0 / LIKELY <= np.sqrt(free[0] * free[1]) <= LIKELY:
-        return []
+        return nothing
+    mean = decel[applied].mean() / linings[applied].mean()
     wanted = 1.0 / np.sqrt(least * most)
     fitting = [
         unit
@@ -128,4 +132,8 @@ def _unit(series: InputSeries, car: Car, pressures: Vector, change: Vector, rows
         if scale != 1.0 and 1.0 / FRICTION < wanted / scale < FRICTION
     ]
     remedy = f'unit = "{fitting[0]}"' if fitting else "check unit and factor, and brakes and mass of CONFIG"
-    return [f"calliper_pressure_*: the car brakes {wanted:.2g} times what these pressures give; {remedy}"]
+    gives = f"calliper_pressure_*: the car brakes {wanted:.2g} times what these pressures give"
+    if 1.0 / FRICTION <= mean <= FRICTION:
+        reason = f"{mean:.2g} times on the mean: friction changes with pressure, or {remedy}"
+        return Pressures([], [f"{gives}, {reason}"], [])
+    return Pressures([f"{gives}; {remedy}"], [], [])
