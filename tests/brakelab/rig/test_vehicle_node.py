@@ -9,7 +9,7 @@ import pytest
 
 from brakelab.plant.description import load_plant
 from brakelab.rig import vehicle_node
-from brakelab.rig.vehicle_node import drive_in_real_time, main, new_node, write_truth_file
+from brakelab.rig.vehicle_node import drive_in_real_time, main, new_node, stay_with_ecu, write_truth_file
 from brakelab.simulation.closed_loop import plans
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Scenario, load_scenario
@@ -110,6 +110,19 @@ def test_demands_of_the_ecu_are_obeyed() -> None:
     clock = FakeClock()
     truth = drive_in_real_time(new_node(scenario(1.0), 1), FakeBus(clock, ecu=22.0), clock.source())
     assert column(truth.values, "calliper_pressure_rr")[-1] == pytest.approx(22.0, abs=0.2)
+
+
+def test_after_its_script_the_car_goes_on_until_it_stands() -> None:
+    clock = FakeClock()
+    bus, node = FakeBus(clock, ecu=22.0), new_node(scenario(1.0), 1)
+    truth = drive_in_real_time(node, bus, clock.source())
+    reached = column(truth.values, "vehicle_speed")[-1]
+    stay_with_ecu(node, bus, clock.source(), len(truth.t), lambda: len(bus.sent) >= 400)
+    assert node.side.vehicle.state[0]["speed_x"] < reached - 5.0
+    stay_with_ecu(node, bus, clock.source(), len(bus.sent), lambda: len(bus.sent) >= 2000)
+    assert node.side.vehicle.state[0]["speed_x"] == pytest.approx(0.0, abs=0.01)
+    front = [frames[frames["can_id"] == 0x74]["data"][0][2:] for frames in bus.sent[-400:]]
+    assert len(set(map(bytes, front))) > 300, "pressures with noise, not the last reading again"
 
 
 def test_missed_periods_are_lived_through() -> None:

@@ -97,7 +97,9 @@ class Rig:
             self.periods += 1
             at_ns = self.periods * CYCLE_NS + START_NS - CYCLE_NS // 10
             side, heard, self.heard = self.node.side, self.heard, 0
-            sent = live_through(plans(), side, self.node.noise, at_ns, heard, 1, self.periods, self._row)
+            sent = live_through(
+                plans(), side, self.node.noise, at_ns, heard, 1, self.periods, self._row, False
+            )
             arrived = side.to_ecu.arrived[:sent]
             arrived["stamp_ns"] = at_ns
             frames[start + count : start + count + sent] = arrived

@@ -121,8 +121,11 @@ def live_through(
     periods: int,
     cycle: int,
     row: NDArray[np.float64],
+    stays: bool,
 ) -> int:
     """Decode the demands, advance by `periods` cycles, measure.
+
+    At the end of the script the car goes on if it `stays`: brakes as they are, accelerator released.
 
     Returns the number of frames of `side.to_ecu.arrived` to send, -1 at the end.
     """
@@ -132,10 +135,13 @@ def live_through(
     received = deliver(vehicle.faults, side.to_vehicle, t, noise, side.frames_in, received)
     receive(plan.vehicle_hears, side.reception, side.to_vehicle.arrived, 0, received, side.heard[0])
     decode_demands(side.heard[0], vehicle.demand[0])
+    driver = vehicle.driver[0]
     for _ in range(periods):
-        if vehicle.driver[0].started:
+        if driver.started or stays:
             advance(vehicle)
-        if not drive(vehicle.script, vehicle.params[0], vehicle.state[0], vehicle.driver[0], 1e-9 * CYCLE_NS):
+        if stays:
+            driver.motor_demand[:] = driver.accelerator_position = 0.0
+        elif not drive(vehicle.script, vehicle.params[0], vehicle.state[0], driver, 1e-9 * CYCLE_NS):
             return -1
     sense(vehicle, noise, side.values)
     write_truth(vehicle, row)
@@ -152,8 +158,7 @@ def drive_in_real_time(
 ) -> Truth:
     """Drive the node's scenario on `channel` to its end, or until `stopped`.
 
-    `set_off` is called with T_0 on the monotonic clock.
-    In missed periods the car advances without sending.
+    `set_off` is called with T_0 on the monotonic clock. In missed periods the car advances without sending.
     """
     side = node.side
     grid = Grid(source)
@@ -168,7 +173,8 @@ def drive_in_real_time(
         start_ns = start_ns or tick.t_ns
         received = channel.drain(side.frames_in, 0)
         row = np.empty(N_TRUTH)
-        count = live_through(plans(), side, node.noise, source.realtime_ns(), received, periods, cycle, row)
+        now_ns = source.realtime_ns()
+        count = live_through(plans(), side, node.noise, now_ns, received, periods, cycle, row, False)
         if count < 0:
             break
         channel.send(side.to_ecu.arrived, count)
@@ -184,16 +190,18 @@ def wait_for_ecu(node: Node, channel: Channel, stopped: Callable[[], bool]) -> N
         time.sleep(0.001)
 
 
-def stay_with_ecu(node: Node, channel: Channel, source: TimeSource, stopped: Callable[[], bool]) -> None:
-    """Keep sending the last sensor readings until the ECU falls silent, or until `stopped`."""
-    side, grid = node.side, Grid(source)
-    cycle = silent = 0
+def stay_with_ecu(
+    node: Node, channel: Channel, source: TimeSource, cycle: int, stopped: Callable[[], bool]
+) -> None:
+    """Let the car go on from `cycle` with its brakes as they are until the ECU falls silent, or `stopped`."""
+    side, grid, row, silent = node.side, Grid(source), np.empty(N_TRUTH), 0
     while silent < SILENCE_CYCLES and not stopped():
-        grid.wait()
-        cycle += 1
-        silent = 0 if channel.drain(side.frames_in, 0) else silent + 1
-        count = transmit(plans().vehicle_sends, side.sent, side.values, cycle, side.frames_out)
-        channel.send(side.frames_out, count)
+        periods, received = grid.wait().missed + 1, channel.drain(side.frames_in, 0)
+        cycle += periods
+        silent = 0 if received else silent + periods
+        at_ns = source.realtime_ns()
+        count = live_through(plans(), side, node.noise, at_ns, received, periods, cycle, row, True)
+        channel.send(side.to_ecu.arrived, count)
 
 
 def write_truth_file(path: Path, truth: Truth, scenario: str, seed: int) -> None:
@@ -213,7 +221,7 @@ def write_truth_file(path: Path, truth: Truth, scenario: str, seed: int) -> None
 def warm_up(scenario: Scenario) -> None:
     """Compile, or load from the cache, the kernels of a cycle."""
     node = new_node(scenario, 0)
-    live_through(plans(), node.side, node.noise, CYCLE_NS, 0, 1, 0, np.empty(N_TRUTH))
+    live_through(plans(), node.side, node.noise, CYCLE_NS, 0, 1, 0, np.empty(N_TRUTH), False)
 
 
 def _tell_set_off(t_mono_ns: int) -> None:
@@ -332,7 +340,7 @@ def drive_on_bus(
         if truth_file is not None:
             written = beside.submit(write_truth_file, truth_file, truth, path.stem, seed)
         if with_ecu:
-            stay_with_ecu(node, channel, source, partial(_ends, stop, written))
+            stay_with_ecu(node, channel, source, len(truth.t), partial(_ends, stop, written))
     if written is not None:
         written.result()
     channel.close()
