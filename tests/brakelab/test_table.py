@@ -32,6 +32,50 @@ def test_a_table_says_what_is_in_it(columns: int, said: str) -> None:
     assert repr(Table({name: COLUMNS[name] for name in names}, TABLE.units)) == said
 
 
+WHEELS = Table(
+    {
+        "mode": np.array([1.0, 2.0]),
+        **{f"{name}_{corner}": np.array([k, np.nan]) for name in ("mode", "wheel_speed", "mu_b")
+           for k, corner in enumerate(("fl", "fr", "rl", "rr"))},
+        "slip_fl": np.zeros(2),
+    },
+    {"wheel_speed_fl": "rad/s", "mu_b_fl": "-"},
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "unit"), [("wheel_speed", "rad/s"), ("mu_b", "-"), ("mode_mu_b", "")])
+def test_a_name_without_its_corner_is_of_all_four_wheels(name: str, unit: str) -> None:
+    assert WHEELS[name].shape == (2, 4)
+    np.testing.assert_array_equal(WHEELS[name][0], [0, 1, 2, 3])
+    assert WHEELS.unit(name) == unit
+    assert WHEELS.unit("wheel_speed_fl") == "rad/s"
+
+
+def test_a_column_of_that_name_comes_first_and_three_wheels_are_none() -> None:
+    assert WHEELS["mode"].shape == (2,)
+    for asked in (WHEELS.__getitem__, WHEELS.unit):
+        with pytest.raises(UserError, match=r"^column: slip: no such column; did you mean slip_fl\?"):
+            asked("slip")
+    assert {"mu_b", "mu_b_rr", "mode", "wheel_speed"} <= {*WHEELS._ipython_key_completions_()}
+
+
+def test_a_notebook_shows_unit_and_range_of_each_column() -> None:
+    html = TABLE._repr_html_()
+    assert "<caption>Table of 3 rows, 5 columns</caption>" in html
+    assert "<tr><th>t</th><td>s</td><td>0</td><td>0.01</td><td>0.02</td></tr>" in html
+    assert "<tr><th>pressure</th><td>bar</td><td>1</td><td>1</td><td>1</td></tr>" in html
+    assert "<tr><th>law</th><td></td><td></td><td></td><td></td></tr>" in html
+    assert "&lt;x&gt;" in Table({"<x>": COLUMNS["t"]}, {})._repr_html_()
+    assert "<tr><th>t</th><td>s</td><td></td>" in EMPTY._repr_html_()
+
+
+def test_what_reads_arrow_takes_a_table(polars: Any) -> None:
+    import pyarrow as pa
+
+    assert pa.table(TABLE).schema.field("t").metadata == {b"unit": b"s"}
+    assert polars.DataFrame(TABLE).equals(TABLE.to_polars())
+
+
 @pytest.fixture
 def polars() -> Any:
     return pytest.importorskip("polars", reason="Polars is not installed")

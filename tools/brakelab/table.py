@@ -1,16 +1,19 @@
 """Columns with their units, as the Python interface hands them out; as pandas, Polars or Arrow on request."""
 
 from collections.abc import Iterator, Mapping
+from html import escape
 from importlib import import_module
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ecu.contract.signals import CORNERS, OUTPUT_SIGNALS, column_names
 from ecu.errors import UserError, closest
 
 SHOWN: Final = 8
 """Columns that a table names of itself."""
+_FOUR: Final = {signal.name: column_names(signal) for signal in OUTPUT_SIGNALS if signal.corners}
 
 
 class Table:
@@ -23,13 +26,24 @@ class Table:
         """By name, empty: none."""
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """Return a column. Raises UserError for a name that is none."""
-        try:
+        """Return a column, shape (rows,), or by a name without its corner all four, shape (rows, 4).
+
+        Raises UserError for a name that is none.
+        """
+        if name in self.columns:
             return self.columns[name]
-        except KeyError:
-            hint = closest(name, self.columns)
-            remedy = f"no such column{hint}; `.columns` has all {len(self.columns)}"
-            raise UserError("column", str(name), remedy) from None
+        return np.stack([self.columns[one] for one in self._four(name)], axis=1)
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a column or of four, empty: none. Raises UserError for a name that is none."""
+        return self.units.get(name if name in self.columns else self._four(name)[0], "")
+
+    def _four(self, name: str) -> tuple[str, ...]:
+        columns = _FOUR.get(name, tuple(f"{name}_{corner}" for corner in CORNERS))
+        if all(column in self.columns for column in columns):
+            return columns
+        remedy = f"no such column{closest(name, self.columns)}; `.columns` has all {len(self.columns)}"
+        raise UserError("column", str(name), remedy)
 
     def __repr__(self) -> str:
         units = {name: f" [{unit}]" if unit else "" for name, unit in self.units.items()}
@@ -37,8 +51,21 @@ class Table:
         shown = ", ".join(named if len(named) <= SHOWN else [*named[:SHOWN], "…"])
         return f"{type(self).__name__} of {len(self)} rows, {len(named)} columns: {shown}"
 
+    def _repr_html_(self) -> str:
+        """Return the columns as a notebook shows them: unit, least, mean and greatest of each."""
+        rows = []
+        for name, column in self.columns.items():
+            known = column[np.isfinite(column)] if np.issubdtype(column.dtype, np.number) else column[:0]
+            figures = [f"{of(known):.4g}" if len(known) else "" for of in (np.min, np.mean, np.max)]
+            rows.append([name, self.units.get(name, ""), *figures])
+        return _html(self, ["column", "unit", "least", "mean", "greatest"], rows)
+
     def _ipython_key_completions_(self) -> list[str]:
-        return [*self.columns]
+        return [*self.columns, *(name[:-3] for name in self.columns if name.endswith(f"_{CORNERS[0]}"))]
+
+    def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
+        """Hand the columns to whatever reads Arrow: polars.DataFrame(table), DuckDB, …"""
+        return self.to_arrow().__arrow_c_stream__(requested_schema)
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -77,6 +104,26 @@ class Table:
             found = f"{mask.dtype} of shape {mask.shape}"
             raise UserError("where", found, f"give a mask of bool of shape ({len(self)},)")
         return Table({name: column[mask] for name, column in self.columns.items()}, self.units)
+
+
+class Listing(Table):
+    """A table of few rows, each of which is read."""
+
+    def _repr_html_(self) -> str:
+        rows = zip(*(column.tolist() for column in self.columns.values()), strict=True)
+        shown = [[f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row] for row in rows]
+        return _html(self, [*self.columns], shown)
+
+
+def _html(table: Table, head: list[str], rows: list[list[str]]) -> str:
+    """Return a table as HTML; the first cell of a row is its name."""
+    title = escape(repr(table).partition(":")[0])
+    lines = "".join(
+        f"<tr><th>{escape(name)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
+        for name, *cells in rows
+    )
+    names = "".join(f"<th>{escape(each)}</th>" for each in head)
+    return f"<table><caption>{title}</caption><tr>{names}</tr>{lines}</table>"
 
 
 def _module(name: str) -> Any:
