@@ -1,13 +1,11 @@
 """Report command: `brake-ecu report RESULT.parquet [--truth TRUTH.parquet] --out REPORT.html`."""
 
 from pathlib import Path
-from typing import NamedTuple
-
-import numpy as np
 
 from brakelab.report.accuracy import accuracy_per_axle, tracking
 from brakelab.report.brakes_section import brakes_section, read_car
-from brakelab.report.brakings import Braking, brakings
+from brakelab.report.brakings import brakings
+from brakelab.report.brakings_table import brakings_table
 from brakelab.report.drive import onto, read_drive
 from brakelab.report.friction import plots_of_friction
 from brakelab.report.loop import plots_of_loop
@@ -15,14 +13,12 @@ from brakelab.report.over_time import POINTS, plots_over_time
 from brakelab.report.page import fill
 from brakelab.report.per_braking import plots_per_braking
 from brakelab.report.prediction import (
-    friction_text,
     peer_errors,
     plots_of_prediction,
     prediction_errors,
     prediction_rows,
 )
 from brakelab.report.quality import drop_placeholders, lacks_pressure, quality_tiles, read_quality
-from brakelab.report.sparkline import sparklines
 from brakelab.report.summary import facts, faults, tiles
 from brakelab.report.timing import read_timing, spreads
 from brakelab.report.wear_section import wear_section
@@ -32,26 +28,6 @@ from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
 _FRICTION = tuple(f"mu_b_{corner}" for corner in CORNERS)
-
-
-class Row(NamedTuple):
-    """A line of the table of brake applications, in the page's units."""
-
-    number: int
-    t_start: float
-    t_end: float
-    duration: float
-    v_in: float
-    v_end: float
-    demanded: float
-    achieved: float
-    predicted: float
-    friction_front: str
-    friction_rear: str
-    temperature_front: float
-    temperature_rear: float
-    kilojoules: float
-    sparkline: str
 
 
 def report(result: Path, truth: Path | None, out: Path, timing: Path | None = None) -> None:
@@ -86,7 +62,6 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
     if accuracy is not None and not any(row.seconds for row in accuracy.values()):
         accuracy = None
     loop = None if timing is None else read_timing(timing)
-    rows = [_row(*pair) for pair in zip(found, sparklines(drive, found), strict=True)]
     predicted = prediction_errors(found)
     wear, wear_plots = wear_section(drive, true, result, quality, without_pressure)
     brakes, brakes_plots = brakes_section(drive, true, car, found, without_pressure)
@@ -107,11 +82,9 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
                 *tiles(drive, found, tracking(drive, true, found), predicted, accuracy, loop),
                 *(quality_tiles(quality) if quality else []),
             ],
-            "brakings": rows,
+            **brakings_table(drive, found),
+            "zooms": True,
             "without_pressure": without_pressure,
-            "with_temperature": any(np.isfinite(row.temperature_front) for row in rows),
-            "with_sparklines": any(row.sparkline for row in rows),
-            "with_energy": any(np.isfinite(row.kilojoules) for row in rows),
             "predictions": prediction_rows(found),
             "prediction_errors": predicted,
             "prediction_peers": peer_errors(found),
@@ -131,23 +104,3 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
         out.write_text(page, "utf-8")
     except OSError as error:
         raise UserError(str(out), error.strerror or "not writable", "choose another --out") from error
-
-
-def _row(braking: Braking, sparkline: str) -> Row:
-    return Row(
-        number=braking.number,
-        t_start=braking.t_start,
-        t_end=braking.t_end,
-        duration=braking.t_end - braking.t_start,
-        v_in=braking.v_in,
-        v_end=braking.v_end,
-        demanded=braking.demanded,
-        achieved=braking.achieved,
-        predicted=braking.predicted,
-        friction_front=friction_text(braking.friction[:2], braking.friction_sigma[:2]),
-        friction_rear=friction_text(braking.friction[2:], braking.friction_sigma[2:]),
-        temperature_front=float(braking.temperature_in[:2].mean()),
-        temperature_rear=float(braking.temperature_in[2:].mean()),
-        kilojoules=braking.energy * 1e-3,
-        sparkline=sparkline,
-    )

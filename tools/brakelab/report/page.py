@@ -15,7 +15,7 @@ from jinja2 import DictLoader, Environment, StrictUndefined
 from brakelab.report.look import DARK
 
 PAGE: Final[Traversable] = files("brakelab.report") / "page.html.j2"
-PARTS: Final = ("brakes_section.html.j2", "wear_section.html.j2")
+PARTS: Final = ("brakings_table.html.j2", "brakes_section.html.j2", "wear_section.html.j2")
 """Sections that pages include."""
 _NONE = "–"
 
@@ -61,14 +61,8 @@ def embed(figures: Mapping[str, Any]) -> tuple[str, dict[str, str]]:
     return components(dict(figures))
 
 
-def fill(
-    plots: Mapping[str, Mapping[str, Any]],
-    content: Mapping[str, Any],
-    template: Traversable = PAGE,
-) -> str:
-    """Return the page; `plots` maps the template's places to figures by name, `content` is the rest."""
-    figures = {name: plot for group in plots.values() for name, plot in group.items()}
-    script, divs = embed(figures)
+def environment() -> Environment:
+    """Return what fills templates: with the parts and the forms of numbers."""
     here = files("brakelab.report")
     # Autoescape: names of files and metadata come from outside.
     page = Environment(
@@ -79,15 +73,31 @@ def fill(
         lstrip_blocks=True,
     )
     page.filters.update(fixed=fixed, percent=percent, signed_percent=signed_percent, kmh=kmh)
-    return page.from_string(template.read_text("utf-8")).render(
-        css=(here / "page.css").read_text("utf-8"),
-        js=(here / "page.js").read_text("utf-8"),
-        dark=json.dumps(DARK),
-        bokeh=Resources(mode="inline", components=["bokeh"]).render(),
-        script=script,
-        **{
-            place: [{"div": divs[name], "height": plot.height} for name, plot in group.items()]
-            for place, group in plots.items()
-        },
-        **content,
+    return page
+
+
+def fill(
+    plots: Mapping[str, Mapping[str, Any]],
+    content: Mapping[str, Any],
+    template: Traversable = PAGE,
+) -> str:
+    """Return the page; `plots` maps the template's places to figures by name, `content` is the rest."""
+    figures = {name: plot for group in plots.values() for name, plot in group.items()}
+    script, divs = embed(figures)
+    here = files("brakelab.report")
+    return (
+        environment()
+        .from_string(template.read_text("utf-8"))
+        .render(
+            css=(here / "page.css").read_text("utf-8"),
+            js=(here / "page.js").read_text("utf-8"),
+            dark=json.dumps(DARK),
+            bokeh=Resources(mode="inline", components=["bokeh"]).render(),
+            script=script,
+            **{
+                place: [{"div": divs[name], "height": plot.height} for name, plot in group.items()]
+                for place, group in plots.items()
+            },
+            **content,
+        )
     )
