@@ -1,5 +1,6 @@
 """The Python interface: the same figures as the command line, columns with units, one error for a mistake."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.api import Result, Simulation, UserError, load, replay, simulate
+from brakelab.api import Result, Simulation, UserError, load, open_result, replay, simulate
 from brakelab.table import Table
 from ecu import cli
 from ecu.contract.signals import INPUT_SIGNALS
@@ -109,6 +110,33 @@ def test_changes_are_keys_of_the_configuration(config: str, drive: Simulation, r
     assert changed.metadata["config_hash"] != result.metadata["config_hash"]
 
 
+def test_a_result_is_opened_as_it_was_handed_out(result: Result) -> None:
+    opened = open_result(result)
+    np.testing.assert_array_equal(opened["mu_b"], result["mu_b"])
+    assert opened["mu_b"].shape == (len(result), 4)
+    assert (opened.unit("brake_torque"), opened.units, opened.metadata) == (
+        "N m",
+        result.units,
+        result.metadata,
+    )
+    assert len(opened.brakings) == 4
+
+
+def test_a_notebook_shows_the_brake_applications_of_the_page(result: Result, tmp_path: Path) -> None:
+    shown, page = result._repr_html_(), result.report(tmp_path / "stop.html").read_text("utf-8")
+    cells = [re.findall(r"<td[^>]*>([^<]*)</td>", text.partition("<tbody>")[2]) for text in (shown, page)]
+    assert f"suv: Result of {len(result)} rows, {len(result.columns)} columns<" in shown
+    assert len(cells[0]) > 8
+    assert cells[0][1:9] == cells[1][:8], "the page has a button in place of the number"
+    assert 'class="spark"' in shown
+    assert "<button" not in shown
+
+
+def test_a_drive_without_braking_says_so_in_a_notebook(drive: Simulation) -> None:
+    quiet = replay(drive.inputs.where(drive.inputs["t"] < 5.0), config="suv")
+    assert "no brake application of 0.5 s or longer" in quiet._repr_html_()
+
+
 def test_a_page_is_written(drive: Simulation, result: Result, tmp_path: Path) -> None:
     page = result.report(tmp_path / "stop.html", truth=drive.truth_path)
     assert page.stat().st_size > 100_000
@@ -128,8 +156,9 @@ def test_a_map_is_taken_by_name(tmp_path: Path) -> None:
         (lambda: load("no.log"), "no.log: no such file"),
         (lambda: replay(MUSTANG, config="nosuch"), "nosuch: no such file, and none that is shipped"),
         (lambda: replay(MUSTANG, config="suv"), "give the signal map of this car"),
-        (lambda: load(Table({}, {})), "log: Table: is no file: write it first"),  # type: ignore[arg-type]
-        (lambda: replay(Table({}, {}), config="suv"), "log: Table: is no file"),  # type: ignore[arg-type]
+        (lambda: open_result("no.parquet"), "no.parquet: no such file; give a result"),
+        (lambda: load(Table({}, {})), "table: columns: column t is missing"),
+        (lambda: replay(5, config="suv"), "log: int: is neither a log nor a table"),
         (lambda: replay([], config="suv"), "logs: the list is empty"),
         (lambda: replay(MUSTANG, config="suv", changes={"front.mu": 0.4}), "changes: front.mu: unknown key"),
         (lambda: replay(MUSTANG, config="suv", changes={"front mu": 0.4}), "changes: front mu: no key"),

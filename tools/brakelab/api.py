@@ -1,9 +1,10 @@
 """Python interface: read a log, replay it, simulate a scenario; results are columns with units.
 
-    from brakelab.api import load, replay, simulate
+    from brakelab.api import load, open_result, replay, simulate, suggest_map, identify, compare
 
 Files may be given by path, or configurations, maps and scenarios by the names that are shipped, as on the
-command line. Nothing is printed; what is wrong is an `ecu.errors.UserError`. docs/python.md has examples.
+command line; a log of signals as a table, its map by its content. Nothing is printed; what is wrong is an
+`ecu.errors.UserError`. docs/python.md has examples.
 """
 
 import json
@@ -13,28 +14,46 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
+from brakelab.commands import Comparison, Suggestion, compare, identify, suggest_map
+from brakelab.given import AnyPath, Log, given
+from brakelab.given import Map as AnyMap
 from brakelab.identify.config_file import Section, write_car
 from brakelab.replay.command import replay_into
 from brakelab.replay.needed import NEEDED, nothing_usable
 from brakelab.replay.quality import Findings, damage_lines
 from brakelab.replay.source import check_map, load_source
+from brakelab.report.brakings_table import notebook
 from brakelab.report.command import report as write_report
+from brakelab.report.drive import DriveResult
 from brakelab.results.files import EXPORTS, brakes_path, read_result
 from brakelab.rig.play.play_log import decoded
 from brakelab.simulation.simulate import simulate as run_scenario
 from brakelab.simulation.vehicle_bus import truth_unit
 from brakelab.table import Table
-from ecu.arguments import config_file, map_file, scenario_file
+from ecu.arguments import config_file, scenario_file
 from ecu.contract.signals import INPUT_SIGNALS
 from ecu.errors import UserError
 
-__all__ = ["Drive", "Result", "Simulation", "Table", "UserError", "load", "replay", "simulate"]
+__all__ = [
+    "Comparison",
+    "Drive",
+    "Result",
+    "Simulation",
+    "Suggestion",
+    "Table",
+    "UserError",
+    "compare",
+    "identify",
+    "load",
+    "open_result",
+    "replay",
+    "simulate",
+    "suggest_map",
+]
 
-AnyPath = str | os.PathLike[str]
 Change = float | int | bool | str | Sequence[float]
 _KEY = re.compile(r"\w+(\.\w+)*", re.ASCII)
 INPUT_UNITS = {signal.name: signal.unit for signal in INPUT_SIGNALS}
@@ -52,7 +71,7 @@ class Drive(Table):
 class Result(Table):
     """Result of a replay: outputs of the ECU every 10 ms, `t` [s]."""
 
-    def __init__(self, path: Path, notes: list[str], folder: TemporaryDirectory[str] | None) -> None:
+    def __init__(self, path: Path, notes: list[str], folder: TemporaryDirectory[str] | None = None) -> None:
         rows, brakes = read_result(path), read_result(brakes_path(path))
         super().__init__(rows.columns, rows.units)
         self.brakings = Table(brakes.columns, brakes.units)
@@ -64,6 +83,15 @@ class Result(Table):
         self.path = path
         """File of the result; without `out` it is there as long as this object."""
         self._folder = folder
+
+    def __fspath__(self) -> str:
+        return str(self.path)
+
+    def _repr_html_(self) -> str:
+        """Return the brake applications as the page of the report shows them."""
+        drive = DriveResult(self["t"], self.columns, self.metadata)
+        title = f"{self.metadata.get('vehicle', '')}: {repr(self).partition(':')[0]}"
+        return notebook(drive, self.path, title)
 
     def report(self, out: AnyPath, truth: AnyPath | None = None) -> Path:
         """Write the page on this drive and return its path.
@@ -92,21 +120,35 @@ class Simulation:
         """True values, every 10 ms."""
 
 
-def load(log: AnyPath, *, map: AnyPath | None = None) -> Drive:
+def open_result(path: AnyPath) -> Result:
+    """Return a result of `brake-ecu replay` or `demo`.
+
+    Raises:
+        UserError: it cannot be read, or its brake applications beside it cannot.
+    """
+    return Result(Path(path), [])
+
+
+def load(log: Log, *, map: AnyMap | None = None) -> Drive:
     """Return the inputs of a log of any format.
 
     Args:
-        log: frames, signals or the folder of a recording (docs/logs.md).
-        map: signal map or map of columns; None: the contract's frames or names.
+        log: frames, signals or the folder of a recording (docs/logs.md), or a table of signals: of pandas,
+            Polars or pyarrow, or arrays by name.
+        map: signal map or map of columns, by path, name or content; None: the contract's frames or names.
 
     Raises:
         UserError: the log or the map is not right.
     """
-    path = _file(log)
+    with given() as files:
+        return _loaded(files.log(log), files.map(map))
+
+
+def _loaded(path: Path, map: Path | None) -> Drive:
     if not path.exists():
         raise UserError(str(path), "", "no such file; give an existing log")
-    found, source = Findings(path), load_source(map_file(os.fspath(map)) if map is not None else None)
-    unused = check_map(Path(map), source, path) if map is not None else ""
+    found, source = Findings(path), load_source(map)
+    unused = check_map(map, source, path) if map is not None else ""
     notes = [line for line in (source.left_out, unused) if line]
     samples = list(decoded(path, source, found))
     t_ns = np.array([stamp for stamp, _ in samples], np.int64)
@@ -118,18 +160,11 @@ def load(log: AnyPath, *, map: AnyPath | None = None) -> Drive:
     return Drive(Table(columns, units), [*notes, *damage_lines(found)])
 
 
-def _file(log: Any) -> Path:
-    if not isinstance(log, str | os.PathLike):
-        remedy = 'is no file: write it first, table.to_parquet("drive.parquet")'
-        raise UserError("log", type(log).__name__, remedy)
-    return Path(log)
-
-
 def replay(
-    logs: AnyPath | Sequence[AnyPath],
+    logs: Log | Sequence[Log],
     *,
     config: AnyPath,
-    map: AnyPath | None = None,
+    map: AnyMap | None = None,
     observer: str | None = None,
     state: AnyPath | None = None,
     changes: Mapping[str, Change] | None = None,
@@ -154,26 +189,19 @@ def replay(
     """
     if out is not None and Path(out).suffix in EXPORTS:
         raise UserError("out", str(out), "is Parquet here; `brake-ecu replay` writes MDF4 and MCAP")
-    given = logs if isinstance(logs, Sequence) and not isinstance(logs, str) else [logs]
-    paths = [_file(log) for log in given]
-    if not paths:
+    several = logs if isinstance(logs, Sequence) and not isinstance(logs, str) else [logs]
+    if not several:
         raise UserError("logs", "", "the list is empty; give the logs of one drive")
     folder = TemporaryDirectory(prefix="brake-ecu-") if out is None else None
-    written = Path(folder.name, f"{paths[0].stem}.parquet") if folder else Path(out or "")
-    with changed(config, changes) as car:
-        done = replay_into(
-            paths,
-            car,
-            map_file(os.fspath(map)) if map is not None else None,
-            observer,
-            Path(state) if state is not None else None,
-            written,
-            force=force,
-        )
-    if nothing_usable(done.findings):
-        names = ", ".join(group.name for group in NEEDED)
-        raise UserError(str(paths[0]), "", f"not one sample of the needed inputs was usable ({names})")
-    return Result(written, done.notes, folder)
+    with given() as files, changed(config, changes) as car:
+        paths = [files.log(log) for log in several]
+        result = Path(folder.name, f"{paths[0].stem}.parquet") if folder else Path(out or "")
+        learned = Path(state) if state is not None else None
+        done = replay_into(paths, car, files.map(map), observer, learned, result, force=force)
+        if nothing_usable(done.findings):
+            names = ", ".join(group.name for group in NEEDED)
+            raise UserError(str(paths[0]), "", f"not one sample of the needed inputs was usable ({names})")
+        return Result(result, [files.said(note) for note in done.notes], folder)
 
 
 def simulate(

@@ -210,7 +210,10 @@ def compare(a: Path, b: Path) -> int:
         for row in heavy:
             by_quantity.setdefault(without_corner(row.name), row)
         worst = list(by_quantity.values())
-        listed += [row._asdict() | {"of": title, "at": _place(title, before, row)} for row in found]
+        listed += [
+            row._asdict() | {"of": title, "unit": units.get(row.name, ""), "at": _place(title, before, row)}
+            for row in found
+        ]
         if worst:
             places = [_place(title, before, row) for row in worst]
             _show(console, f"{title} that differ, by their worst corner", worst, units, places)

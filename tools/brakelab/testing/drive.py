@@ -15,7 +15,8 @@ import tomlkit
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from brakelab.api import AnyPath, Change, changed, check_seed
+from brakelab.api import Change, changed, check_seed
+from brakelab.given import AnyPath
 from brakelab.report.drive import DriveResult, read_drive, start_ns
 from brakelab.rig.live import choose_bus
 from brakelab.rig.live import drive as drive_on_bus

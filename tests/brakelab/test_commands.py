@@ -1,0 +1,95 @@
+"""Commands as functions: what they give is what the command line writes, and nothing is printed."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakelab.api import Result, Simulation, UserError, compare, identify, replay, simulate, suggest_map
+from ecu import cli
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def drive() -> Simulation:
+    return simulate("stop-1", config="suv")
+
+
+@pytest.fixture(scope="module")
+def result(drive: Simulation) -> Result:
+    return replay(drive.log, config="suv")
+
+
+def said(words: list[str], capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    assert cli.main([*words, "--json"]) in (0, 1)
+    given: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return given
+
+
+def test_a_comparison_is_that_of_the_command(
+    drive: Simulation, result: Result, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = replay(drive.log, config="suv", changes={"front.mu_nominal": 0.35})
+    found = compare(result, other.path)
+    assert capsys.readouterr() == ("", "")
+    given = said(["compare", str(result.path), str(other.path)], capsys)
+    assert found.matter == given["matter"] > 10
+    assert (found.verdicts, found.provenance) == (given["verdicts"], given["provenance"])
+    assert found["name"].tolist() == [row["name"] for row in given["differences"]]
+    mu_b = found["name"] == "mu_b_fl"
+    assert found["unit"][mu_b].tolist() == ["-"]
+    assert found["weight"][0] == found["weight"].max() > 1.0
+    assert "<th>of</th><th>name</th>" in found._repr_html_()
+    same = compare(result, result)
+    assert (len(same), same.matter) == (0, 0)
+
+
+def test_a_map_is_suggested_as_by_the_command_and_taken_as_it_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, dbc = ROOT / "tests/data/mustang.log", ROOT / "dbc/cars/mustang.dbc"
+    found = suggest_map(log, dbc=dbc)
+    assert capsys.readouterr() == ("", "")
+    given = said(["map", "suggest", str(log), "--dbc", str(dbc)], capsys)
+    assert found.text == given["map"]
+    assert found["target"].tolist()[:2] == ["wheel_speed_fl", "wheel_speed_fr"]
+    assert found.where(found["target"] == "wheel_speed_fl")["evidence"].tolist() == ["by their names"]
+    assert len(replay(log, config="mustang", map=found.map)) == 200
+    out = tmp_path / "map.toml"
+    suggest_map(log, dbc=dbc, out=out)
+    assert out.is_file()
+
+
+def test_a_table_s_columns_are_suggested(drive: Simulation) -> None:
+    found = suggest_map(drive.inputs.to_pandas())
+    assert found.map["inputs"]["accel_x"] == {"column": "accel_x"}
+    assert np.all(found["factor"] == 1.0)
+
+
+def test_identify_gives_figures_and_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trip = simulate("fixed-pedal", config="suv").inputs
+    given = identify("vehicle", trip, config="suv", out=tmp_path / "car.toml", closed=True)
+    assert capsys.readouterr() == ("", "")
+    assert given["written"][0] == tmp_path / "car.toml"
+    radii = [one.value for one in given["parameters"] if one.key.endswith("wheel_radius")]
+    assert all(0.2 < radius < 0.5 for radius in radii)
+    assert len(replay(trip, config=given["written"][0])) == len(trip)
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: identify("tyre", [], out="x.toml"), "identify tyre: No such command 'tyre'"),
+        (lambda: identify("wear", "x.csv", out="x.toml"), "identify wear: Missing option '--config'"),
+        (lambda: identify("dust", "x.csv", out="x.toml", foo=1), "identify dust: No such option: --foo"),
+        (lambda: suggest_map("no.log"), "no.log: cannot be read"),
+        (lambda: compare("a.parquet", "b.parquet"), "a.parquet: no such file"),
+    ],
+)
+def test_a_mistake_is_the_command_s(call: Any, says: str) -> None:
+    with pytest.raises(UserError) as error:
+        call()
+    assert says in str(error.value)
