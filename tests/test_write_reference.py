@@ -8,9 +8,13 @@ from pathlib import Path
 import pytest
 
 import write_reference as reference
+from brakelab.results.files import BRAKE_SCHEMA, ROW_SCHEMA
+from columns_page import PAGE as COLUMNS
+from columns_page import columns_text
 from contract_page import EXAMPLE, contract_text
 from diagnostics_tables import PAGE as DIAGNOSTICS
 from diagnostics_tables import with_tables
+from ecu.contract.signals import CORNERS
 from requirements_page import PAGE as REQUIREMENTS
 from requirements_page import SAFETY, proofs, requirements, requirements_text
 from xcp_tables import PAGE as XCP
@@ -92,6 +96,22 @@ def test_a_row_of_the_reference_says_what_the_model_does() -> None:
 def test_the_contract_is_that_of_database_and_code() -> None:
     page = (reference.DOCS / "contract.md").read_text("utf-8")
     assert page == contract_text(), "run python tools/write_reference.py"
+
+
+def test_every_column_of_a_result_is_listed_once_with_unit_and_meaning() -> None:
+    page = COLUMNS.read_text("utf-8")
+    assert page == columns_text(), "run python tools/write_reference.py"
+    rows, _, brakes = page.partition("## Brake applications")
+    for part, schema in ((rows, ROW_SCHEMA), (brakes, BRAKE_SCHEMA)):
+        listed = re.findall(r"^\| `(\w+\*?)` \| (.+?) \| (.+?) \|", part, re.M)
+        names = [
+            name
+            for one, _, _ in listed
+            for name in ([one[:-1] + corner for corner in CORNERS] if "*" in one else [one])
+        ]
+        assert names == [field.name for field in schema]
+        units = {name: unit for name, unit, _ in listed}
+        assert all(units.get(field.name, "") in ("", field.metadata[b"unit"].decode()) for field in schema)
 
 
 def test_the_tables_of_diagnostics_are_those_of_the_code() -> None:

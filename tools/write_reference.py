@@ -3,7 +3,7 @@
     python tools/write_reference.py
 
 writes docs/reference-*.md, with unit, range, default and meaning of each key, docs/contract.md,
-docs/requirements.md and the tables of docs/diagnostics.md and docs/xcp.md.
+docs/requirements.md, docs/reference-columns.md, and the tables of docs/diagnostics.md and docs/xcp.md.
 """
 
 import math
@@ -14,6 +14,8 @@ from pydantic import BaseModel
 
 from brakelab.logs.column_map import ColumnMap
 from brakelab.simulation.scenario import Scenario
+from columns_page import PAGE as COLUMNS
+from columns_page import columns_text
 from contract_page import contract_text
 from diagnostics_tables import PAGE as DIAGNOSTICS
 from diagnostics_tables import with_tables
@@ -211,7 +213,11 @@ if __name__ == "__main__":
     for name in PAGES:
         (DOCS / name).write_text(page_text(name), "utf-8")
         print(DOCS / name)
-    for page, text in ((DOCS / "contract.md", contract_text()), (REQUIREMENTS, requirements_text())):
+    for page, text in (
+        (DOCS / "contract.md", contract_text()),
+        (COLUMNS, columns_text()),
+        (REQUIREMENTS, requirements_text()),
+    ):
         page.write_text(text, "utf-8")
         print(page)
     for page, with_its_tables in ((DIAGNOSTICS, with_tables), (XCP, with_xcp_tables)):

@@ -121,64 +121,66 @@ class OutputSignal(NamedTuple):
     corners: bool
     message: str
     """DBC message (for a corner quantity split over the axles: its stem), empty: results only."""
+    meaning: str
+    """For the reference of columns."""
 
 
 OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
-    OutputSignal("vehicle_speed", "m/s", False, ""),
-    OutputSignal("k_f", "-", False, ""),
-    OutputSignal("mode", "-", False, "EcuStatus"),
-    OutputSignal("slip", "-", True, ""),
-    OutputSignal("wheel_force_x", "N", True, ""),
-    OutputSignal("wheel_force_z", "N", True, ""),
-    OutputSignal("mu_b", "-", True, "Blcf"),
-    OutputSignal("sigma_mu_b", "-", True, "Blcf"),
-    OutputSignal("mode_mu_b", "-", True, "Blcf"),  # sent and written as mode_fl, mode_fr, …
-    OutputSignal("brake_torque", "N m", True, ""),
-    OutputSignal("pressure_demand", "bar", True, "PressureDemand"),
-    OutputSignal("pressure_demand_valid", "-", False, "PressureDemandFront PressureDemandRear"),
-    OutputSignal("motor_demand", "N m", True, "MotorDemand"),
-    OutputSignal("motor_demand_valid", "-", False, "MotorDemandFront MotorDemandRear"),
-    OutputSignal("disc_temperature", "degC", True, "DiscTemperature"),
-    OutputSignal("pad_wear", "mm", True, "PadWear"),
-    OutputSignal("pad_remaining", "%", True, "PadWear"),
-    OutputSignal("pad_wear_mass", "g", True, ""),
-    OutputSignal("particles_last_brake", "-", False, "ParticleEmissions"),
-    OutputSignal("particles_per_km", "1/km", False, "ParticleEmissions"),
-    OutputSignal("active_faults", "-", False, "EcuStatus"),
-    OutputSignal("active_faults_2", "-", False, "EcuFaults"),
-    OutputSignal("overruns", "-", False, "EcuStatus"),
-    OutputSignal("worst_lateness_us", "us", False, "EcuStatus"),
-    # Beyond the contract: quantities for the interpretation of results.
-    OutputSignal("decel_demand_total", "m/s^2", False, ""),  # the larger of pedal map and decel_demand
-    OutputSignal("accel_x_road", "m/s^2", False, ""),  # specific force in road axes, pitch removed
-    OutputSignal("accel_x_model", "m/s^2", False, ""),  # the same by torques and drag
-    OutputSignal("accel_x_zero", "m/s^2", False, ""),  # zero error of the accelerometer, as learned
-    OutputSignal("vehicle_mass", "kg", False, ""),  # as learned
-    OutputSignal("sigma_brake_force", "-", False, ""),  # of all linings together at equal pressures, relative
-    OutputSignal("overrun", "m/s^2", False, ""),  # unreported engine drag while braking
-    OutputSignal("braking", "-", False, ""),  # 1 while a brake application lasts
-    OutputSignal("calliper_pressure", "bar", True, ""),  # as measured, last sample
-    OutputSignal("pressure_zero", "bar", True, ""),  # pressure zero
-    OutputSignal("pressure_uncompensated", "bar", True, ""),  # the demand with the base friction
-    OutputSignal("sigma_disc_temperature", "K", True, ""),
-    OutputSignal("sigma_pad_wear", "mm", True, ""),
-    OutputSignal("particles_last_brake_low", "-", False, ""),  # 95 % interval of the last application
-    OutputSignal("particles_last_brake_high", "-", False, ""),
-    OutputSignal("particle_mass_per_km", "mg/km", False, ""),  # of all linings, up to 10 um
-    # Test ratio of the last window: above 1 a measurement counts less. Joint observer only.
-    OutputSignal("test_ratio", "-", True, ""),  # of wheel speed
-    OutputSignal("test_ratio_balance", "-", False, ""),  # of the forces along the car
-    OutputSignal("test_ratio_speed", "-", False, ""),  # of the speed reference
-    OutputSignal("grip_limit", "m/s^2", False, ""),  # ceiling of the brakes' deceleration by road and tyres
-    OutputSignal("sigma_grip_limit", "m/s^2", False, ""),
-    OutputSignal("grip_knee", "-", False, ""),  # exponent of the bend towards it; NaN: the ECU brakes
-    OutputSignal("motor_torque_share", "-", False, ""),  # of reported torques that counts, by the motion
-    OutputSignal("torque_demand", "N m", True, ""),  # of the linings: that of the pressure demand
-    OutputSignal("pressure_lateness_rise", "s", False, ""),  # of pressures behind their demands, as learned
-    OutputSignal("pressure_lateness_fall", "s", False, ""),
+    OutputSignal("vehicle_speed", "m/s", False, "", "speed over ground, as estimated"),
+    OutputSignal("k_f", "-", False, "", "scale of the tyre model (4.18), 1 where it fits"),
+    OutputSignal("mode", "-", False, "EcuStatus", "0 starting, 1 ready, 2 active, 3 degraded, 4 failed"),
+    OutputSignal("slip", "-", True, "", "longitudinal, negative while braking; null at standstill"),
+    OutputSignal("wheel_force_x", "N", True, "", "between tyre and road, negative while braking"),
+    OutputSignal("wheel_force_z", "N", True, "", "wheel load"),
+    OutputSignal("mu_b", "-", True, "Blcf", "friction of the linings, as estimated"),
+    OutputSignal("sigma_mu_b", "-", True, "Blcf", "its standard deviation"),
+    # Sent and written as mode_fl, …
+    OutputSignal("mode_mu_b", "-", True, "Blcf", "0 nominal, 1 observing, 2 holding, 3 fault"),
+    OutputSignal("brake_torque", "N m", True, "", "torque of the linings on the wheel, a magnitude"),
+    OutputSignal("pressure_demand", "bar", True, "PressureDemand", "demanded of the calliper, as sent"),
     OutputSignal(
-        "sigma_overrun", "m/s^2", False, ""
-    ),  # of `overrun` and of the noise of an application's mean
+        "pressure_demand_valid", "-", False, "PressureDemandFront PressureDemandRear", "1: to be obeyed"
+    ),
+    OutputSignal("motor_demand", "N m", True, "MotorDemand", "demanded at the wheel, positive brakes"),
+    OutputSignal("motor_demand_valid", "-", False, "MotorDemandFront MotorDemandRear", "1: to be obeyed"),
+    OutputSignal("disc_temperature", "degC", True, "DiscTemperature", "of the disc, by its model"),
+    OutputSignal("pad_wear", "mm", True, "PadWear", "thickness that the pads have lost"),
+    OutputSignal("pad_remaining", "%", True, "PadWear", "share of their wearable thickness that is left"),
+    OutputSignal("pad_wear_mass", "g", True, "", "mass that the two pads of the calliper have lost"),
+    OutputSignal("particles_last_brake", "-", False, "ParticleEmissions", "of all brakes that have a model"),
+    OutputSignal("particles_per_km", "1/km", False, "ParticleEmissions", "since these models count"),
+    OutputSignal("active_faults", "-", False, "EcuStatus", "fault bits, see faults.md"),
+    OutputSignal("active_faults_2", "-", False, "EcuFaults", "fault bits from the 33rd on"),
+    OutputSignal("overruns", "-", False, "EcuStatus", "periods that were missed"),
+    OutputSignal("worst_lateness_us", "us", False, "EcuStatus", "greatest of a cycle so far"),
+    # Beyond the contract: quantities for the interpretation of results.
+    OutputSignal("decel_demand_total", "m/s^2", False, "", "the larger of pedal map and decel_demand"),
+    OutputSignal("accel_x_road", "m/s^2", False, "", "specific force in road axes, pitch removed"),
+    OutputSignal("accel_x_model", "m/s^2", False, "", "the same by torques and drag"),
+    OutputSignal("accel_x_zero", "m/s^2", False, "", "zero error of the accelerometer, as learned"),
+    OutputSignal("vehicle_mass", "kg", False, "", "mass of the car, as learned"),
+    OutputSignal("sigma_brake_force", "-", False, "", "of the force of all linings together, relative"),
+    OutputSignal("overrun", "m/s^2", False, "", "unreported engine drag while braking"),
+    OutputSignal("braking", "-", False, "", "1 while a brake application lasts"),
+    OutputSignal("calliper_pressure", "bar", True, "", "as measured, last sample"),
+    OutputSignal("pressure_zero", "bar", True, "", "what the sensor reads without pressure"),
+    OutputSignal("pressure_uncompensated", "bar", True, "", "the demand with the base friction"),
+    OutputSignal("sigma_disc_temperature", "K", True, "", "standard deviation of the disc temperature"),
+    OutputSignal("sigma_pad_wear", "mm", True, "", "standard deviation of the wear"),
+    OutputSignal("particles_last_brake_low", "-", False, "", "lower limit of 95 %"),
+    OutputSignal("particles_last_brake_high", "-", False, "", "upper limit"),
+    OutputSignal("particle_mass_per_km", "mg/km", False, "", "airborne wear of all linings, up to 10 µm"),
+    OutputSignal("test_ratio", "-", True, "", "of wheel speed in the last window; above 1 it counts less"),
+    OutputSignal("test_ratio_balance", "-", False, "", "of the forces along the car, likewise"),
+    OutputSignal("test_ratio_speed", "-", False, "", "of the speed reference, likewise"),
+    OutputSignal("grip_limit", "m/s^2", False, "", "ceiling of deceleration by road and tyres"),
+    OutputSignal("sigma_grip_limit", "m/s^2", False, "", "its standard deviation"),
+    OutputSignal("grip_knee", "-", False, "", "exponent of the bend towards it; null where the ECU brakes"),
+    OutputSignal("motor_torque_share", "-", False, "", "share of reported torques that counts"),
+    OutputSignal("torque_demand", "N m", True, "", "of the linings: that of the pressure demand"),
+    OutputSignal("pressure_lateness_rise", "s", False, "", "of pressures behind their demands, as learned"),
+    OutputSignal("pressure_lateness_fall", "s", False, "", "likewise, of falling ones"),
+    OutputSignal("sigma_overrun", "m/s^2", False, "", "its standard deviation, with the noise of a mean"),
 )
 
 DEMANDS: Final = {

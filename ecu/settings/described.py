@@ -26,15 +26,16 @@ def descriptions(model: type[BaseModel]) -> dict[str, str]:
     found = dict[str, str]()
     for kind in reversed(model.__mro__):
         if issubclass(kind, BaseModel) and kind is not BaseModel:
-            (table,) = ast.parse(dedent(getsource(kind))).body
-            assert isinstance(table, ast.ClassDef)
-            found |= _texts_below_keys(table.body)
+            found |= texts_below_keys(kind)
     return found
 
 
-def _texts_below_keys(lines: list[ast.stmt]) -> dict[str, str]:
+def texts_below_keys(kind: type) -> dict[str, str]:
+    """Return the text below each key of a class, its own alone."""
+    (table,) = ast.parse(dedent(getsource(kind))).body
+    assert isinstance(table, ast.ClassDef)
     found = dict[str, str]()
-    for key, below in pairwise(lines):
+    for key, below in pairwise(table.body):
         match key, below:
             case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
                 found[name] = cleandoc(text)

@@ -38,55 +38,91 @@ class BrakeRow(NamedTuple):
     """
 
     brake: Annotated[int, "-"]
+    """Number of the application, from 0."""
     corner: Annotated[str, "-"]
+    """fl, fr, rl or rr."""
     t_start: Annotated[float, "s"]
+    """Its first row."""
     duration: Annotated[float, "s"]
+    """From its first to its last row and one more."""
     v_in: Annotated[float, "m/s"]
+    """Speed at its start."""
     v_end: Annotated[float, "m/s"]
+    """Speed at its end."""
     decel_mean: Annotated[float, "m/s^2"]
+    """(v_in - v_end) / duration, at least 0."""
     decel_predicted: Annotated[float, "m/s^2"]
+    """The same from pressures and the friction learned before."""
     mu_b_mean: Annotated[float, "-"]
+    """Friction by torque and pressure, mean by distance."""
     mu_b_mean_time: Annotated[float, "-"]
+    """Mean by time."""
     brake_torque_mean: Annotated[float, "N m"]
+    """Of the linings."""
     brake_energy: Annotated[float, "J"]
+    """Into this brake."""
     disc_temperature_in: Annotated[float, "degC"]
+    """At its start."""
     disc_temperature_mean: Annotated[float, "degC"]
+    """Mean over it."""
     pad_wear_mass: Annotated[float, "g"]
+    """That both pads lose."""
     emission_factor: Annotated[float, "log10(particles)"]
+    """Particles of this brake."""
     mu_b_end: Annotated[float, "-"]
+    """Friction known after it."""
     sigma_mu_b_end: Annotated[float, "-"]
+    """Its standard deviation."""
     observed: Annotated[float, "s"]
+    """Time in which friction was observed."""
     learning: Annotated[str, "-"]
-    """`LEARNED`, or why this application taught nothing."""
+    """`learned`, or why this application taught nothing."""
     mu_b_before: Annotated[float, "-"]
+    """Friction known before it."""
     sigma_mu_b_before: Annotated[float, "-"]
+    """Its standard deviation."""
     specific_force_mean: Annotated[float, "m/s^2"]
     """Measured; positive braking."""
     specific_force_predicted: Annotated[float, "m/s^2"]
+    """By pressures and motors, and what was known before."""
     sigma_specific_force: Annotated[float, "m/s^2"]
+    """Standard deviation of the prediction."""
     specific_force_configured: Annotated[float, "m/s^2"]
     """Predicted with the configured friction."""
     specific_force_rest: Annotated[float, "m/s^2"]
     """Part of the predicted one that is not the linings'."""
     specific_force_configured_rest: Annotated[float, "m/s^2"]
+    """Likewise, of the one with the configured friction."""
     learned_before: Annotated[int, "-"]
     """1: the friction in the prediction was learned, 0: it is nominal."""
     left_out: Annotated[str, "-"]
     """Why the prediction does not count, empty where it does."""
     sigma_pad_wear_mass: Annotated[float, "g"]
+    """Standard deviation of the mass."""
     emission_factor_low: Annotated[float, "log10(particles)"]
+    """Lower limit of 95 %."""
     emission_factor_high: Annotated[float, "log10(particles)"]
+    """Upper limit."""
     particle_mass: Annotated[float, "mg"]
     """By the wear that the ECU believes, measured thicknesses included."""
     particle_mass_low: Annotated[float, "mg"]
+    """Lower limit of 95 %."""
     particle_mass_high: Annotated[float, "mg"]
+    """Upper limit."""
     wear_energy: float
+    """Regressor of the wear law (7.16), P power, T disc temperature: ∫ P dt."""
     wear_energy_t: float
+    """∫ P T dt."""
     wear_energy_t2: float
+    """∫ P T² dt."""
     wear_torque_rate: float
+    """∫ of torque times the wheel's deceleration."""
     wear_torque_rate_t: float
+    """The same times T."""
     wear_power2: float
+    """∫ P² dt."""
     wear_power2_t: float
+    """∫ P² T dt."""
 
 
 BRAKE_UNITS: Final = {
