@@ -3,7 +3,7 @@
     python tools/write_reference.py
 
 writes docs/reference-*.md, with unit, range, default and meaning of each key, docs/contract.md,
-docs/requirements.md, docs/reference-columns.md, and the tables of docs/diagnostics.md and docs/xcp.md.
+docs/requirements.md, the tables of docs/diagnostics.md and docs/xcp.md, and layouts in tools/deploy.
 """
 
 import math
@@ -23,6 +23,7 @@ from ecu.bus.signal_map import SignalMap
 from ecu.contract.signals import INPUT_SIGNALS, without_corner
 from ecu.settings.schema import config_schema
 from ecu.settings.sections import Config
+from layouts import FOXGLOVE, PLOTJUGGLER, foxglove_text, plotjuggler_text
 from requirements_page import PAGE as REQUIREMENTS
 from requirements_page import requirements_text
 from xcp_tables import PAGE as XCP
@@ -217,6 +218,8 @@ if __name__ == "__main__":
         (DOCS / "contract.md", contract_text()),
         (COLUMNS, columns_text()),
         (REQUIREMENTS, requirements_text()),
+        (FOXGLOVE, foxglove_text()),
+        (PLOTJUGGLER, plotjuggler_text()),
     ):
         page.write_text(text, "utf-8")
         print(page)

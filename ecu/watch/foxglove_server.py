@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from ecu.contract.signals import CORNERS, OUTPUT_SIGNALS, topic_of
 from ecu.errors import UserError
+from ecu.settings.resources import resource
 from ecu.watch.history import COLUMN, COLUMNS, Event, Row
 from ecu.watch.line import faults_of
 from ecu.watch.watcher import Watcher, follow
@@ -19,6 +20,7 @@ from ecu.watch.watcher import Watcher, follow
 PORT: Final = 8765
 """At which Foxglove looks."""
 EVENTS: Final = "/events"
+LAYOUT: Final = "tools/deploy/foxglove-brake-ecu.json"
 INFO, WARNING = 2, 3  # of foxglove.Log
 UNITS: Final = {
     **{signal.name: signal.unit for signal in OUTPUT_SIGNALS},
@@ -26,6 +28,8 @@ UNITS: Final = {
     "clock": "s since 1970",
     "lateness": "us",
 }
+PLACES: Final = [topic_of(column.replace("mode_mu_b_", "mode_")) for column in COLUMNS]
+"""Topic and name of each column, as in results."""
 Log = Callable[[dict[str, Any], int], None]
 """Takes a message and its time [ns]."""
 
@@ -36,8 +40,7 @@ def schemas() -> dict[str, dict[str, Any]]:
         "/ecu": {"faults": {"type": "array", "items": {"type": "string"}}},
         **{f"/corner/{corner}": {} for corner in CORNERS},
     }
-    for column in COLUMNS:
-        topic, name = topic_of(column)
+    for topic, name in PLACES:
         found[topic][name] = {"type": "number", "description": UNITS.get(name, "")}
     titles = {topic: "brake_ecu.ecu" if topic == "/ecu" else "brake_ecu.corner" for topic in found}
     line = {"level": "integer", "message": "string", "name": "string"}
@@ -56,8 +59,7 @@ def schemas() -> dict[str, dict[str, Any]]:
 def messages(row: Row) -> dict[str, dict[str, Any]]:
     """Return the message of each topic on a row."""
     found: dict[str, dict[str, Any]] = {"/ecu": {"faults": faults_of(row)}}
-    for column, value in zip(COLUMNS, row.tolist(), strict=True):
-        topic, name = topic_of(column)
+    for (topic, name), value in zip(PLACES, row.tolist(), strict=True):
         if math.isfinite(value):
             found.setdefault(topic, {})[name] = value
     return found
@@ -122,7 +124,8 @@ def serve(watcher: Watcher, port: int) -> int:
             "--port", str(port), f"cannot be served: {error}; give another one, 0 for any"
         ) from None
     print(
-        f"ws://127.0.0.1:{server.port} in Foxglove (Ctrl-C ends it); {watcher.trouble or 'attached'}",
+        f"ws://127.0.0.1:{server.port} in Foxglove (Ctrl-C ends it), layout {resource(LAYOUT)}; "
+        f"{watcher.trouble or 'attached'}",
         flush=True,
     )
     try:

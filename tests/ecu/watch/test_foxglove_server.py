@@ -6,10 +6,10 @@ import pytest
 
 from ecu import cli
 from ecu.contract.faults import WHEEL_SPEED_LOST
-from ecu.contract.signals import topic_of
+from ecu.contract.signals import OUTPUT_COLUMNS, topic_of
+from ecu.settings.resources import resource
 from ecu.watch import foxglove_server
-from ecu.watch.foxglove_server import Publisher, schemas
-from ecu.watch.history import COLUMNS
+from ecu.watch.foxglove_server import EVENTS, Publisher, schemas
 from ecu.watch.watcher import Watcher
 
 
@@ -68,10 +68,11 @@ def test_messages_are_as_their_schemas_in_the_topics_of_an_mcap_file(published):
     described = schemas()
     assert all(set(message) <= set(described[topic]["properties"]) for topic, message, _ in said)
     assert described["/corner/fl"]["properties"]["calliper_pressure"]["description"] == "bar"
-    for column in COLUMNS:
-        of_a_corner = column[-3:] in ("_fl", "_fr", "_rl", "_rr")
-        place = (f"/corner/{column[-2:]}", column[:-3]) if of_a_corner else ("/ecu", column)
-        assert topic_of(column) == place
+    own = {("/ecu", name) for name in ("t", "clock", "lateness", "speaks", "faults")}
+    places = {
+        (topic, name) for topic in described for name in described[topic]["properties"] if topic != EVENTS
+    }
+    assert places - own <= {topic_of(column) for column in OUTPUT_COLUMNS}
 
 
 @pytest.mark.parametrize(
@@ -111,6 +112,9 @@ def test_foxglove_is_served_on_this_machine_alone_and_a_taken_port_is_named(loop
 
     monkeypatch.setattr(foxglove_server, "follow", end)
     assert cli.main(["watch", "--foxglove", "--port", "0"]) == 0
-    assert "ws://127.0.0.1:" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "ws://127.0.0.1:" in said
+    assert resource(foxglove_server.LAYOUT).is_file()
+    assert str(resource(foxglove_server.LAYOUT)) in said
     assert set(hosts) == {"127.0.0.1"}
     first.stop()
