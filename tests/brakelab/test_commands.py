@@ -55,6 +55,8 @@ def test_a_map_is_suggested_as_by_the_command_and_taken_as_it_is(
     assert capsys.readouterr() == ("", "")
     given = said(["map", "suggest", str(log), "--dbc", str(dbc)], capsys)
     assert found.text == given["map"]
+    assert found.others["target"].tolist() == [row["target"] for row in given["others"]]
+    assert found.others["signal"][0] in found.text
     assert found["target"].tolist()[:2] == ["wheel_speed_fl", "wheel_speed_fr"]
     assert found.where(found["target"] == "wheel_speed_fl")["evidence"].tolist() == ["by their names"]
     assert len(replay(log, config="mustang", map=found.map)) == 200

@@ -53,6 +53,10 @@ class Suggestion(Listing):
     def __init__(self, figures: dict[str, Any]) -> None:
         names = ("target", "message", "signal", "factor", "offset", "unit", "evidence", "sure", "warning")
         super().__init__(_columns(figures["inputs"], names), {})
+        self.others = Listing(
+            _columns(figures["others"], ("target", "message", "signal", "unit", "evidence")), {}
+        )
+        """Signals that are not proposed: other sources of an input, and candidates of one that is missing."""
         self.text: str = figures["map"]
         """The map, with its evidence as comments."""
         self.map = tomllib.loads(self.text)

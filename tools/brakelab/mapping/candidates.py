@@ -11,7 +11,7 @@ from brakelab.logs.physics.line import Fit, fit, smooth
 from brakelab.logs.physics.samples import Rows
 from brakelab.mapping.motion import Motion, contract_unit, is_near, on_grid
 from brakelab.mapping.names import converts, names_itself, score, tells_direction, tells_pressure
-from brakelab.mapping.series import Series
+from brakelab.mapping.series import Series, coarseness
 from ecu.bus.units import spelled
 
 LEAST_CORRELATION: Final = 0.5  # correlation that speaks for a signal
@@ -19,7 +19,7 @@ LEAST_ALONE: Final = 0.8  # for one whose unit or name says nothing
 PER_WORD: Final = 0.1  # of correlation, that a word of the name is worth
 NEAR: Final = 0.02  # of correlation, by which two signals follow equally well
 STEPS: Final = 8  # fewer values are states, and nothing measured
-FASTER: Final = 0.8  # of the interval, from which on the other of them is taken
+BETTER: Final = 0.8  # of the coarseness, from which on the other of them is taken
 IN_DEGREES: Final = 10.0  # slope against radians, of a signal without a unit, from which it must be degrees
 
 
@@ -50,14 +50,14 @@ def best_of(
         least = LEAST_CORRELATION if named else LEAST_ALONE
         if not strength >= least:
             continue
-        # Between signals that follow equally well the name decides, then the rate.
+        # Between signals that follow equally well the name decides, then steps and rate.
         fitting.append((strength + PER_WORD * points, one, found))
     if not fitting:
         return None
     best = max(fitting, key=lambda candidate: candidate[0])
     near = [candidate for candidate in fitting if candidate[0] > best[0] - NEAR]
-    fastest = min(near, key=lambda candidate: candidate[1].mean_interval)
-    return (fastest if fastest[1].mean_interval < FASTER * best[1].mean_interval else best)[1:]
+    finest = min(near, key=lambda candidate: coarseness(candidate[1]))
+    return (finest if coarseness(finest[1]) < BETTER * coarseness(best[1]) else best)[1:]
 
 
 def by_name(series: Iterable[Series], target: str) -> Series | None:

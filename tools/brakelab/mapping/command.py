@@ -18,9 +18,10 @@ from brakelab.mapping.columns import column_map_text, read_column_series
 from brakelab.mapping.drive_torque import motors
 from brakelab.mapping.map_text import input_lines, radius_line
 from brakelab.mapping.motion import Found, motion_of, wheel_speeds
-from brakelab.mapping.names import converts, words
+from brakelab.mapping.names import COUNTING, converts, words
 from brakelab.mapping.physics import propose
 from brakelab.mapping.series import Series, read_series
+from brakelab.mapping.sources import Source, other_sources
 from brakelab.mapping.torque import FORMULA, brake_torque, stand_in
 from brakelab.replay.log import log_size
 from brakelab.replay.quality import Findings, damage_lines
@@ -34,7 +35,6 @@ from ecu.errors import UserError
 from ecu.output import give, say
 from ecu.settings.config import load_config, new_params
 
-COUNTING: Final = {"counter", "count", "cnt", "cntr", "alive", "ctr", "no"}
 WANTED: Final = (
     *("wheel_speed_fl", "accel_x", "accel_y", "yaw_rate", "steering_angle", "calliper_pressure_fl"),
     *("pedal_position", "accelerator_position", "motor_torque_fl", "abs_active"),
@@ -92,8 +92,10 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
     if not any(one.target.startswith("motor_torque") for one in found):
         found += motors(here, wheel_speeds(series), motion)
     strict = not any(one.series.message in overlapping for one in found)
-    text = map_text(found, here, (out or Path("map.toml")), dbc, strict, interfaces, bus, hints, car)
-    _show(found, drives)
+    others = other_sources(found, here, motion, car)
+    comments = [*hints, *map(str, others)]
+    text = map_text(found, here, (out or Path("map.toml")), dbc, strict, interfaces, bus, comments, car)
+    _show(found, drives, others)
     for line in hints + _warnings(found):
         say(line)
     if written := _written(text, out):
@@ -134,11 +136,13 @@ def _suggest_columns(log: Path, out: Path | None, car: Car) -> int:
         raise UserError(str(log), "", f"{among}; {remedy}")
     wheel = found[0].series
     _refuse_unitless(log, wheel, f'write it behind the names: "{wheel.signal} [km/h]"', car)
-    _show(found, drives)
+    others = other_sources(found, series, motion_of(wheel_speeds(series), car), car)
+    _show(found, drives, others)
     for line in _warnings(found):
         say(line)
     after = {one.target: timeout(one) for one in found}
-    if written := _written(column_map_text(log, columns, found, after, car), out):
+    text = column_map_text(log, columns, found, after, car) + "".join(f"# {one}\n" for one in others)
+    if written := _written(text, out):
         read_column_map(written)
         _say_next(log, written)
     return 0
@@ -187,7 +191,7 @@ def _load(dbc: Path) -> tuple[Database, list[str]]:
     return Database(usable, strict=False), overlapping
 
 
-def _show(found: list[Found], drives: bool) -> None:
+def _show(found: list[Found], drives: bool, others: list[Source]) -> None:
     console = Console(stderr=True)
     if not console.is_terminal:
         console = Console(stderr=True, width=WIDTH)
@@ -204,7 +208,16 @@ def _show(found: list[Found], drives: bool) -> None:
     console.print(table)
     names = ("target", "factor", "offset", "unit", "evidence", "sure", "warning")
     give(inputs=[{name: getattr(one, name) for name in names} | _source(one) for one in found])
-    targets = {one.target for one in found}
+    if others:
+        table = Table(title="not proposed", title_justify="left")
+        for column in ("input", "signal", "unit", "why"):
+            table.add_column(column)
+        for other in others:
+            table.add_row(without_corner(other.target), other.name, other.series.unit, other.evidence)
+        console.print(table)
+    given = [{"target": one.target, "evidence": one.evidence, "unit": one.series.unit} for one in others]
+    give(others=[row | _source(one) for row, one in zip(given, others, strict=True)])
+    targets = {one.target for one in found} | {one.target for one in others}
     missing = [without_corner(name) for name in WANTED if name not in targets]
     if missing:
         console.print(f"nothing found for {', '.join(missing)}", highlight=False)
@@ -212,7 +225,7 @@ def _show(found: list[Found], drives: bool) -> None:
         console.print("the car stands in this log: signs and scales could not be checked", highlight=False)
 
 
-def _source(found: Found) -> dict[str, str]:
+def _source(found: Found | Source) -> dict[str, str]:
     return {"message": found.series.message, "signal": found.series.signal}
 
 

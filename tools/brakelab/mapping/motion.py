@@ -9,7 +9,7 @@ from brakelab.arrays import Vector
 from brakelab.logs.physics.line import MOVING, RATE, smooth
 from brakelab.logs.physics.samples import ANY_CAR, Car, Rows
 from brakelab.mapping.names import converts, corner_of, score
-from brakelab.mapping.series import Series
+from brakelab.mapping.series import Series, coarseness
 from ecu.bus.units import CONVERSIONS, spelled
 from ecu.contract.signals import CORNERS, INPUT, INPUT_SIGNALS
 
@@ -88,7 +88,7 @@ def wheel_speeds(series: Iterable[Series]) -> dict[str, Series]:
     """Return the four wheel speeds by corner, empty if there are none.
 
     Four signals whose names differ by the corner alone, in a unit of speed or rotation, or named as wheels;
-    of one message where one has all four. A car may send them twice: the finer ones are taken.
+    of one message where one has all four. A car may send them twice: the less coarse ones are taken.
     """
     groups: dict[tuple[str, int], dict[str, dict[str, Series]]] = {}
     for one in series:
@@ -104,11 +104,11 @@ def wheel_speeds(series: Iterable[Series]) -> dict[str, Series]:
         sets.append({corner: one for group in reversed(parts) for corner, one in group.items()})
     whole = [group for group in sets if len(group) == len(CORNERS)]
 
-    def worth(group: dict[str, Series]) -> tuple[bool, float, int, float]:
+    def worth(group: dict[str, Series]) -> tuple[bool, float, float]:
         means = np.array([np.nanmean(np.abs(one.value)) for one in group.values()])
         together = bool(means.max() <= 1.1 * means.min() + 0.5)
         name = score(group["fl"].name, "wheel_speed")
-        return together, name, len(np.unique(group["fl"].value)), -round(group["fl"].period, 3)
+        return together, name, -coarseness(group["fl"])
 
     best = max(whole, key=worth, default=None)
     return {} if best is None else {corner: best[corner] for corner in CORNERS}

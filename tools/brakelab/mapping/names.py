@@ -71,8 +71,20 @@ AGAINST: Final = {
     "steering_angle": ("rate", "speed", "torque", "tq", "sign", "offset", "geschw", "moment", *_ASKED),
     "yaw_rate": ("offset", "accel", "steer", "sas", *_ASKED),
     "calliper_pressure": (
-        *("oil", "tire", "tyre", "fuel", "booster", "vacuum", "turbo", "rail", "ac", "gradient", "torque"),
-        *("pedal", "position", "pos", "stroke", "travel", "trvl", "light", "switch", *_ASKED),
+        *("oil", "tire", "tyre", "fuel", "booster", "bstr", "vacuum", "vac", "turbo", "rail", "ac"),
+        *(
+            "gradient",
+            "torque",
+            "pedal",
+            "position",
+            "pos",
+            "stroke",
+            "travel",
+            "trvl",
+            "light",
+            "switch",
+            *_ASKED,
+        ),
     ),
     "accelerator_position": ("brake", "brk", "accel_x", "long", "lat", "inverted"),
     "pedal_position": ("accelerator", "gas", "throttle", "clutch", "aped", "pressure", "torque"),
@@ -81,6 +93,9 @@ AGAINST: Final = {
     "esp_active": ("fail", "fault", "warn", "lamp", "def", "pas", "off", "diag"),
 }
 """Words that speak against it."""
+COUNTING: Final = {"counter", "count", "cnt", "cntr", "alive", "ctr", "no"}
+CHECKING: Final = {"crc", "cs", "checksum", "chk", "chksum", "qf", "qbit"}
+"""Words of what a frame says of itself."""
 
 
 def words(name: str) -> list[str]:

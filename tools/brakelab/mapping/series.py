@@ -18,6 +18,7 @@ from ecu.jit import kernel
 FEWEST_FRAMES = 20  # frames of a message
 MAGNITUDES = {"deg", "rad", "deg/s", "rad/s", "m/s^2", "g", "N m"}  # units of what has two sides
 TURNS = 4  # of a sign, in a drive
+NOISE = 0.01  # of a signal's spread, of a usual sensor: Table 4.1 has 0.1 rad/s and 0.01 m/s^2
 ZERO = 0.05  # of the largest value, that a magnitude is below where its sign turns
 
 
@@ -60,6 +61,23 @@ class Series(NamedTuple):
         """Longest time between two values [s]."""
         t = self.t[np.isfinite(self.value)]
         return float(np.diff(t).max()) if len(t) > 1 else math.inf
+
+
+def step(series: Series) -> float:
+    """Return the least step between values, 0: there is but one."""
+    values = np.unique(np.round(series.value[np.isfinite(series.value)], 9))
+    return float(np.diff(values).min()) if len(values) > 1 else 0.0
+
+
+def coarseness(series: Series) -> float:
+    """Return by how much a signal is worse than another that says the same [s].
+
+    Steps q add q²/12 to the variance of a sensor; that of a sample times the interval of the samples is the
+    noise per bandwidth, here over the square of the signal's spread.
+    """
+    spread = float(np.nanstd(series.value))
+    variance = (step(series) / spread) ** 2 / 12.0 + NOISE**2 if spread else math.inf
+    return variance * series.mean_interval
 
 
 @kernel
