@@ -64,8 +64,18 @@ def test_the_image_is_root_s_without_a_compiler_and_says_whether_it_is_well():
     assert re.findall(r"install-onboard.sh (\S+)", made) == ["/opt/brake-ecu"]
     assert re.findall(r"COPY --from=build (\S+) (\S+)", before) == [("/opt/brake-ecu", "/opt/brake-ecu")]
     assert "apt-get" not in image
+    assert "\nVOLUME /home/brake\n" in after, "as its user, whose folder it is"
+    assert re.search(r"-v \S+:/home/brake .*\n.*--state /home/brake/", text)
     assert "chown" not in text
     assert find_spec(re.search(r"HEALTHCHECK (?:.|\n)*? -m (\S+)", after)[1])
+
+
+@pytest.mark.parametrize("words", [(), ("--metrics",), ("/a", "/b"), ("--metrics", "/a", "/b")])
+def test_the_installation_on_board_takes_one_folder(words):
+    script = DEPLOY.parent / "install-onboard.sh"
+    said = subprocess.run(["sh", script, *words], capture_output=True, text=True)
+    assert (said.returncode, said.stdout) == (2, "")
+    assert said.stderr == "install-onboard: usage: tools/install-onboard.sh [--metrics] PREFIX\n"
 
 
 @pytest.mark.parametrize("made", [True, False])

@@ -83,7 +83,7 @@ def test_every_requirement_is_pinned_with_a_hash(lock: Path) -> None:
 def test_the_locks_agree() -> None:
     """The development set holds the others at the same versions: `make test` after `make demo` only adds."""
     everything = _requirements(ROOT / "requirements/dev.txt")
-    for lock in ("onboard", "lab"):
+    for lock in ("onboard", "lab", "metrics"):
         for name, versions in _requirements(ROOT / f"requirements/{lock}.txt").items():
             assert versions <= everything.get(name, set()), f"{lock}.txt: {name}"
 
@@ -101,6 +101,7 @@ def test_the_locks_hold_what_the_project_asks_for() -> None:
     assert names(extras["fleet"]) == set(FLEET)
     assert names(extras["learn"]) == {"scikit-learn"}, "installs sklearn"
     assert not names(extras["metrics"]) & _requirements(ROOT / "requirements/onboard.txt").keys()
+    assert names(extras["metrics"]) == _requirements(ROOT / "requirements/metrics.txt").keys()
     assert onboard <= _requirements(ROOT / "requirements/onboard.txt").keys()
     assert onboard | laboratory <= _requirements(ROOT / "requirements/lab.txt").keys()
     assert names(extras["dev"]) - {"brake-ecu"} <= _requirements(ROOT / "requirements/dev.txt").keys()

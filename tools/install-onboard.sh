@@ -1,12 +1,15 @@
 #!/bin/sh
-# tools/install-onboard.sh PREFIX
+# tools/install-onboard.sh [--metrics] PREFIX
 # Install what runs in the vehicle into PREFIX, an absent or empty folder, with its kernels as a library made
 # here: a start compiles nothing and needs no compiler, and PREFIX may be read-only. Run it as the user that
 # will run the daemon, or as root. Needs a C compiler but no root, and leaves nothing elsewhere.
+# --metrics: with what `run --metrics-port` needs.
 set -eu
 die() { echo "install-onboard: $*" >&2; exit 2; }
 
-[ $# -eq 1 ] || die "usage: tools/install-onboard.sh PREFIX"
+metrics=
+[ "${1-}" != --metrics ] || { metrics=metrics; shift; }
+[ $# -eq 1 ] || die "usage: tools/install-onboard.sh [--metrics] PREFIX"
 mkdir -p "$1" || die "$1: cannot be made; choose a folder that you may write to"
 prefix=$(cd "$1" && pwd)
 [ -z "$(ls -A "$prefix")" ] || die "$prefix: not empty; remove it or choose another folder"
@@ -33,7 +36,10 @@ echo "Building the package"
 
 echo "Installing into $prefix"
 "$python" -m venv "$prefix"
-"$prefix/bin/python" $pip install --no-deps --require-hashes --requirement "$source/requirements/onboard.txt"
+for requirement in onboard $metrics; do
+    "$prefix/bin/python" $pip install --no-deps --require-hashes \
+        --requirement "$source/requirements/$requirement.txt"
+done
 "$prefix/bin/python" $pip install --no-deps "$build"/brake_ecu-*.whl
 "$prefix/bin/python" -P -m ecu.warm --check
 echo "Done: $prefix/bin/brake-ecu; next: $prefix/bin/brake-ecu doctor --config suv -i socketcan -c can0"

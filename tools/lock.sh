@@ -14,6 +14,7 @@ lock() {
 printf 'hatchling\neditables\n' | lock build - "$@"
 lock dev pyproject.toml --extra dev "$@"
 lock lab pyproject.toml --extra lab --constraint requirements/dev.txt
+printf 'prometheus-client\n' | lock metrics - --constraint requirements/dev.txt
 lock onboard pyproject.toml --constraint requirements/dev.txt
 lock compiler pyproject.toml --extra compiler --constraint requirements/dev.txt --no-emit-package numpy
 echo "Now install requirements/dev.txt and run: python tools/write_third_party.py && python tools/write_sbom.py"
