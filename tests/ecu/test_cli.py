@@ -1,6 +1,8 @@
 """What a user reads who typed something wrong: one line, and the exit code."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -140,6 +142,12 @@ def test_help_of_every_command_names_the_options_on_output(capsys: pytest.Captur
         assert cli.main([*line.split(), "--help"]) == 0
         said = capsys.readouterr().out
         assert all(said.count(f"{option} ") == 1 for option in ("--quiet", "--verbose", "--json")), line
+
+
+def test_nothing_is_looked_through_when_the_process_ends() -> None:
+    last = "import atexit, gc; atexit.register(lambda: print(gc.get_freeze_count() > 0)); import ecu.cli"
+    said = subprocess.run([sys.executable, "-c", last], capture_output=True, text=True, check=True)
+    assert said.stdout == "True\n"
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
