@@ -45,12 +45,14 @@ def distance(drive: DriveResult) -> Vector:
 
 def kinds(drive: DriveResult) -> NDArray[np.int64]:
     """Return the place in `KINDS` of each row, shape (n,)."""
-    from scipy.ndimage import maximum_filter1d
-
     speed = 3.6 * np.nan_to_num(np.abs(drive.column("vehicle_speed")))
-    period = float(np.median(np.diff(drive.t)))
-    highest = maximum_filter1d(speed, 2 * int(AROUND / period) + 1, mode="nearest")
-    return np.searchsorted([limit for _, limit in KINDS], highest)
+    around, rows = int(AROUND / float(np.median(np.diff(drive.t)))), np.arange(len(speed))
+    first, end = np.maximum(rows - around, 0), np.minimum(rows + around + 1, len(speed))
+    kind = np.zeros(len(speed), np.int64)
+    for _, limit in KINDS:
+        faster = np.cumsum(np.append(0, speed > limit))
+        kind += faster[end] > faster[first]
+    return kind
 
 
 def roads(drive: DriveResult, applications: list[Application]) -> list[Road]:
