@@ -53,9 +53,11 @@ def test_a_name_without_its_corner_is_of_all_four_wheels(name: str, unit: str) -
 
 def test_a_column_of_that_name_comes_first_and_three_wheels_are_none() -> None:
     assert WHEELS["mode"].shape == (2,)
-    for asked in (WHEELS.__getitem__, WHEELS.unit):
+    for asked in (WHEELS.__getitem__, WHEELS.unit, WHEELS.column):
         with pytest.raises(UserError, match=r"^column: slip: no such column; did you mean slip_fl\?"):
             asked("slip")
+    with pytest.raises(UserError, match=r"^column: mu_b: no such column"):
+        WHEELS.column("mu_b")
     assert {"mu_b", "mu_b_rr", "mode", "wheel_speed"} <= {*WHEELS._ipython_key_completions_()}
 
 

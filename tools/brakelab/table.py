@@ -34,16 +34,25 @@ class Table:
             return self.columns[name]
         return np.stack([self.columns[one] for one in self._four(name)], axis=1)
 
+    def column(self, name: str) -> NDArray[Any]:
+        """Return a single column. Raises UserError for a name that is none."""
+        if name not in self.columns:
+            raise self._none(name)
+        return self.columns[name]
+
     def unit(self, name: str) -> str:
         """Return the unit of a column or of four, empty: none. Raises UserError for a name that is none."""
         return self.units.get(name if name in self.columns else self._four(name)[0], "")
 
     def _four(self, name: str) -> tuple[str, ...]:
         columns = _FOUR.get(name, tuple(f"{name}_{corner}" for corner in CORNERS))
-        if all(column in self.columns for column in columns):
-            return columns
+        if not all(column in self.columns for column in columns):
+            raise self._none(name)
+        return columns
+
+    def _none(self, name: str) -> UserError:
         remedy = f"no such column{closest(name, self.columns)}; `.columns` has all {len(self.columns)}"
-        raise UserError("column", str(name), remedy)
+        return UserError("column", str(name), remedy)
 
     def __repr__(self) -> str:
         units = {name: f" [{unit}]" if unit else "" for name, unit in self.units.items()}

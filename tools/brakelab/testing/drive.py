@@ -107,7 +107,7 @@ def _said(value: float, digits: str, unit: str) -> str:
 
 
 def _signal(drive: DriveResult, name: str, unit: str) -> Signal:
-    return Signal(name, unit or "-", np.asarray(drive.t), Table(drive.columns, {})[name])
+    return Signal(name, unit or "-", np.asarray(drive.t), Table(drive.columns, {}).column(name))
 
 
 class Ecu:
