@@ -103,7 +103,7 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
         if estimate.torques_known:
             faults |= _watch_motion(p, s, u, dt)
         slope = s.speeds.carried.slope[OVER_GROUND]
-        watch_wheel_unit(p, s.wheel_unit, s.witness, u, estimate, slope, dt)
+        watch_wheel_unit(p, s.wheel_unit, s.witness, u, estimate, slope, s.plausibility.jitter, dt)
         watch_wheels(p, s.plausibility, s.witness, u, estimate, dt)
         watch_turning(p, s.turning, s.witness, u, estimate.speed, dt)
         faults |= rejected_faults(s.witness)

@@ -89,6 +89,11 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "speed_sum_at",
         "last_speed",
         "last_speed_at",
+        "took_s",
+        "motor",
+        "kick",
+        "accel",
+        "kept_s",
     ),
 }
 
