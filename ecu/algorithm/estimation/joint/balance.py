@@ -34,6 +34,7 @@ SLIDING_FORCE = 0.3  # relative error of the brake force taken for the force of 
 BALANCE_FLOOR = 0.01  # m/s^2, unmodelled in the balance
 BALANCE_SHARE = 0.004  # of the deceleration
 ACROSS = 0.4  # of the lateral acceleration: stands for a smaller error that lasts a second
+LASTS = 0.05  # of that variance, the error's own: a window of a second
 PERSISTS_S = 0.3  # beyond the gate on one side while braking: then the state is wrong, not the measurement
 UNSEEN_SHARE = 0.15  # of the deceleration, while no wheel speed is known
 SKEW_ACCEL = 0.5  # windows between acceleration and torques
@@ -106,7 +107,7 @@ def correct_by_balance(params: Record, state: Record, braking: bool) -> None:
         + (BALANCE_SHARE * w.accel) ** 2
     )
     variance += (SKEW_ACCEL * (w.accel - state.last_accel)) ** 2
-    variance += (ACROSS * w.across * GRAVITY) ** 2 + (UNKNOWN_KICKS * (1.0 - state.drive_known)) ** 2
+    variance += (UNKNOWN_KICKS * (1.0 - state.drive_known)) ** 2
     for i in range(4):
         per_bar = brake_gain_per_bar(params, i) * friction(params, state, i)
         per_torque = 1.0 / (params.wheel_radius[i] * params.mass)
@@ -125,7 +126,9 @@ def correct_by_balance(params: Record, state: Record, braking: bool) -> None:
     persists = abs(since) >= PERSISTS_S
     wheels_err = persists and abs(_left_before(params, state, left)) < abs(left)
     gate, reject = math.inf if wheels_err else GATE, math.inf if persists else REJECT
-    ratio = correct(state, -left, variance, gate, reject)
-    beyond = braking and ratio > GATE * GATE
+    across = (ACROSS * w.across * GRAVITY) ** 2
+    excess = 0.0 if persists else (1.0 - LASTS) * across
+    ratio = correct(state, -left, variance + LASTS * across + excess, gate, reject)
+    beyond = braking and ratio * (left * left + GATE * GATE * excess) > GATE * GATE * left * left
     state.left_s = since + math.copysign(w.time, left) if beyond else 0.0
     state.ratio[BALANCE_RATIO] = ratio
