@@ -94,6 +94,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "kick",
         "accel",
         "kept_s",
+        "let_go_s",
     ),
 }
 
