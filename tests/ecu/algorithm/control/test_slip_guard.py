@@ -451,9 +451,12 @@ def test_it_is_eased_until_it_has_spun_up_and_then_has_its_share(params, feed, s
     assert not eased[last:].any()
 
 
-def test_a_wheel_that_presses_less_than_the_road_carries_is_not_eased(params, feed) -> None:
-    wanted = np.array([60.0, 60.0, 8.0, 40.0]) * BAR
-    assert not unseen(params, feed, "fl", "rl", wanted)["let_go_s"].any()
+@pytest.mark.parametrize(("slides", "share"), [("fl", SLIDING), ("fl fr rr", BESIDE)])
+def test_a_wheel_that_presses_less_than_the_road_carries_is_not_eased(params, feed, slides, share) -> None:
+    guards = unseen(params, feed, slides, "rl", np.array([60.0, 60.0, 0.5, 40.0]) * BAR)
+    assert not guards["let_go_s"].any()
+    first = guards[np.argmax(guards["capped"][:, 2])]
+    assert first["cap"][2] == pytest.approx(share * first["grip"][2])
 
 
 def test_a_speed_that_is_back_ends_that(params, feed) -> None:
