@@ -18,16 +18,6 @@ from ecu.errors import UserError as EcuUserError
 MUSTANG = Path(__file__).parents[1] / "data" / "mustang.log"
 
 
-@pytest.fixture(scope="module")
-def drive() -> Simulation:
-    return simulate("stop-1", config="suv")
-
-
-@pytest.fixture(scope="module")
-def result(drive: Simulation) -> Result:
-    return replay(drive.log, config="suv")
-
-
 def test_replay_gives_what_the_command_writes(drive: Simulation, result: Result, tmp_path: Path) -> None:
     out = tmp_path / "stop.parquet"
     assert cli.main(["replay", str(drive.log), "--config", "suv", "--out", str(out)]) == 0

@@ -13,16 +13,6 @@ from ecu import cli
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture(scope="module")
-def drive() -> Simulation:
-    return simulate("stop-1", config="suv")
-
-
-@pytest.fixture(scope="module")
-def result(drive: Simulation) -> Result:
-    return replay(drive.log, config="suv")
-
-
 def said(words: list[str], capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
     assert cli.main([*words, "--json"]) in (0, 1)
     given: dict[str, Any] = json.loads(capsys.readouterr().out)

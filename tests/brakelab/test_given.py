@@ -9,18 +9,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakelab.api import UserError, load, replay, simulate
+from brakelab.api import Simulation, UserError, load, replay
 from brakelab.table import Table
 
 pandas = pytest.importorskip("pandas")
-SIGNALS = simulate("stop-1", config="suv").inputs
 
 
 @pytest.fixture(scope="module")
-def friction(tmp_path_factory: pytest.TempPathFactory) -> Any:
+def signals(drive: Simulation) -> Table:
+    return drive.inputs
+
+
+@pytest.fixture(scope="module")
+def friction(signals: Table, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Friction by the same signals as a file, shape (n, 4)."""
     path = tmp_path_factory.mktemp("given") / "signals.parquet"
-    SIGNALS.to_pandas().to_parquet(path)
+    signals.to_pandas().to_parquet(path)
     return replay(path, config="suv")["mu_b"]
 
 
@@ -53,15 +57,15 @@ FORMS = {
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_a_table_is_replayed_to_the_bits_of_a_file(form: str, friction: Any) -> None:
-    result = replay(FORMS[form](SIGNALS), config="suv")
+def test_a_table_is_replayed_to_the_bits_of_a_file(form: str, signals: Table, friction: Any) -> None:
+    result = replay(FORMS[form](signals), config="suv")
     np.testing.assert_array_equal(result["mu_b"], friction)
     assert "/tmp" not in " ".join(result.notes)
 
 
-def test_a_drive_of_two_tables_is_one(friction: Any) -> None:
-    half = SIGNALS["t"] < 8.0
-    both = replay([SIGNALS.where(half), SIGNALS.where(~half).to_pandas()], config="suv")
+def test_a_drive_of_two_tables_is_one(signals: Table, friction: Any) -> None:
+    half = signals["t"] < 8.0
+    both = replay([signals.where(half), signals.where(~half).to_pandas()], config="suv")
     assert len(both) == len(friction)
     assert [one["name"] for one in json.loads(both.metadata["inputs"])] == [
         "table.parquet",
@@ -69,25 +73,25 @@ def test_a_drive_of_two_tables_is_one(friction: Any) -> None:
     ]
 
 
-def renamed() -> Any:
-    frame = SIGNALS.to_pandas()
+def renamed(signals: Table) -> Any:
+    frame = signals.to_pandas()
     return frame.rename(columns={name: f"x_{name}" for name in frame if name != "t"})
 
 
-def test_a_map_of_columns_is_given_by_its_content(friction: Any) -> None:
+def test_a_map_of_columns_is_given_by_its_content(signals: Table, friction: Any) -> None:
     inputs: dict[str, Any] = {
-        name: {"column": f"x_{name}", "unit": SIGNALS.units[name]} for name in SIGNALS if name != "t"
+        name: {"column": f"x_{name}", "unit": signals.units[name]} for name in signals if name != "t"
     }
-    result = replay(renamed(), config="suv", map={"inputs": inputs})
+    result = replay(renamed(signals), config="suv", map={"inputs": inputs})
     np.testing.assert_array_equal(result["mu_b"], friction)
 
 
-def test_units_come_with_what_to_pandas_gave() -> None:
-    frame = SIGNALS.to_pandas()
+def test_units_come_with_what_to_pandas_gave(signals: Table) -> None:
+    frame = signals.to_pandas()
     frame["speed"] = 3.6 * frame.pop("vehicle_speed")
     frame.attrs["units"]["speed"] = "km/h"
     drive = load(frame, map={"inputs": {"vehicle_speed": {"column": "speed"}}})
-    np.testing.assert_allclose(drive["vehicle_speed"][:50], load(SIGNALS)["vehicle_speed"][:50])
+    np.testing.assert_allclose(drive["vehicle_speed"][:50], load(signals)["vehicle_speed"][:50])
 
 
 def test_a_map_of_frames_is_given_by_its_content(monkeypatch: pytest.MonkeyPatch) -> None:
