@@ -20,10 +20,12 @@ def said(words: list[str], capsys: pytest.CaptureFixture[str]) -> dict[str, Any]
 
 
 def test_a_comparison_is_that_of_the_command(
-    drive: Simulation, result: Result, capsys: pytest.CaptureFixture[str]
+    drive: Simulation, result: Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     other = replay(drive.log, config="suv", changes={"front.mu_nominal": 0.35})
-    found = compare(result, other.path)
+    page = tmp_path / "both.html"
+    found = compare(result, other.path, out=page)
+    assert page.is_file()
     assert capsys.readouterr() == ("", "")
     given = said(["compare", str(result.path), str(other.path)], capsys)
     assert found.matter == given["matter"] > 10

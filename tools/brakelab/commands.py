@@ -119,10 +119,10 @@ def identify(
         return run_command(["identify", model, *logs], map=files.map(map), out=out, **options)
 
 
-def compare(a: AnyPath, b: AnyPath) -> Comparison:
-    """Compare result `b` with `a`, as `compare`.
+def compare(a: AnyPath, b: AnyPath, *, out: AnyPath | None = None) -> Comparison:
+    """Compare result `b` with `a`, as `compare`; `out`: page of both to write.
 
     Raises:
         UserError: one is none, or the two have no row in common.
     """
-    return Comparison(run_command(["compare", a, b]))
+    return Comparison(run_command(["compare", a, b], out=out))

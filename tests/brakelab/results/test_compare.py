@@ -4,11 +4,14 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from brakelab.replay.command import replay
-from brakelab.results.compare import compare, differences
+from brakelab.results.compare import differences
 from ecu import cli
+from ecu.contract.faults import BRAKE_FADE, LATE
+from ecu.contract.signals import STARTING
 from ecu.settings.resources import resource
 
 LOG = Path(__file__).parents[2] / "golden" / "mustang_braking.log.gz"
@@ -64,7 +67,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 def test_a_result_equals_itself(results, capsys) -> None:
-    assert compare(results["joint"], results["joint"]) == 0
+    assert cli.main(["compare", str(results["joint"]), str(results["joint"])]) == 0
     assert "0 columns differ" in capsys.readouterr().out
 
 
@@ -80,9 +83,48 @@ def test_another_observer_is_named_and_shown(results, capsys) -> None:
     assert "braking 1" in said
 
 
+def test_faults_that_only_one_has_are_named(results, tmp_path, capsys) -> None:
+    """Bits that both have, and those of the start, are no difference."""
+    table = pq.read_table(results["joint"])
+    place = table.column_names.index("active_faults")
+    mask = table["active_faults"].to_numpy().copy()
+    mask[table["mode"].to_numpy() == STARTING] |= BRAKE_FADE
+    mask[-5:] |= LATE
+    other = tmp_path / "late.parquet"
+    pq.write_table(table.set_column(place, table.field(place), [mask]), other)
+    assert cli.main(["compare", str(results["joint"]), str(other)]) == 1
+    assert "faults that only one has: none -> late\n" in capsys.readouterr().out
+
+
 def test_what_is_no_result_is_one_line(results, capsys) -> None:
     brakes = results["joint"].with_name("joint.brakes.parquet")
     assert cli.main(["compare", str(results["joint"]), str(brakes)]) == 2
     assert capsys.readouterr().err == (
         f"brake-ecu: {brakes}: columns: no result; give what `brake-ecu replay` wrote\n"
     )
+
+
+def test_a_page_shows_both_with_the_verdict_first(results, tmp_path, capsys) -> None:
+    page = tmp_path / "both.html"
+    words = ["compare", str(results["joint"]), str(results["observer2"])]
+    assert cli.main([*words, "--out", str(page)]) == 1
+    said = capsys.readouterr().out
+    text = page.read_text("utf-8")
+    off = re.search(r"off by: ([\d.]+) % .*-> ([\d.]+) %", said)
+    assert off is not None
+    first = text[text.index('aria-label="Summary"') :]
+    assert first.index(f"{off[1]} → {off[2]}") < first.index("that differ</h2>")
+    assert "observer: joint -&gt; observer2" in text
+    for drawn in ("vehicle_speed [m/s]", "mu_b_fl [-]"):
+        assert drawn in text
+
+
+@pytest.mark.parametrize(
+    ("out", "words"), [("a.txt", "let the name end in .html"), ("", "which this command reads")]
+)
+def test_a_page_replaces_no_result(results, tmp_path, capsys, out: str, words: str) -> None:
+    joint, other = results["joint"], results["observer2"]
+    before = joint.read_bytes()
+    assert cli.main(["compare", str(joint), str(other), "--out", str(tmp_path / out if out else joint)]) == 2
+    assert words in capsys.readouterr().err
+    assert joint.read_bytes() == before

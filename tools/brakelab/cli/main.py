@@ -237,11 +237,23 @@ def fleet(
 def compare(
     a: Annotated[Path, argument("A.parquet", "Results of `replay`")],
     b: Annotated[Path, argument("B.parquet", "Results of another version or tuning")],
+    out: Annotated[Path | None, option("PAGE.html", "Page of both to write, self-contained")] = None,
 ) -> int:
     """Compare two results, largest difference first. Exit code 1: a difference matters."""
     from brakelab.results import compare
 
-    return compare.compare(a, b)
+    if out is not None:
+        from brakelab.report.page import check_page
+
+        check_page(out, [a, b])
+    found = compare.find(a, b)
+    compare.show(found, a, b)
+    if out is not None:
+        from brakelab.report.comparison import write_page
+
+        write_page(found, a, b, out)
+        wrote(out)
+    return 1 if found.matter else 0
 
 
 @app.command()

@@ -10,7 +10,7 @@ from brakelab.report.drive import onto, read_drive
 from brakelab.report.friction import plots_of_friction
 from brakelab.report.loop import plots_of_loop
 from brakelab.report.over_time import POINTS, plots_over_time
-from brakelab.report.page import fill
+from brakelab.report.page import check_page, fill
 from brakelab.report.per_braking import plots_per_braking
 from brakelab.report.prediction import (
     peer_errors,
@@ -23,7 +23,7 @@ from brakelab.report.summary import facts, faults, tiles
 from brakelab.report.timing import read_timing, spreads
 from brakelab.report.wear_section import wear_section
 from brakelab.report.wheel_torque import reference_of
-from brakelab.results.outputs import check_outputs
+from brakelab.results.outputs import write_text
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
@@ -38,9 +38,7 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
     them that is missing or damaged, and when `out` cannot be written.
     """
     recorded = [] if timing is None else [timing, timing / "cycles.bin"]
-    check_outputs(out, [out], [result, *([truth] if truth else []), *recorded])
-    if out.suffix.lower() not in (".html", ".htm"):
-        raise UserError("--out", str(out), "the report is a web page; let the name end in .html")
+    check_page(out, [result, *([truth] if truth else []), *recorded])
     drive = read_drive(
         result, ("vehicle_speed", *_FRICTION), "give a RESULT.parquet that `brake-ecu replay` or `demo` wrote"
     )
@@ -99,8 +97,4 @@ def report(result: Path, truth: Path | None, out: Path, timing: Path | None = No
             "spreads": {} if loop is None else spreads(loop),
         },
     )
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(page, "utf-8")
-    except OSError as error:
-        raise UserError(str(out), error.strerror or "not writable", "choose another --out") from error
+    write_text(out, page)

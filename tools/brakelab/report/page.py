@@ -2,9 +2,10 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from importlib.resources.abc import Traversable
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from bokeh.document import Document
@@ -13,6 +14,8 @@ from bokeh.resources import Resources
 from jinja2 import DictLoader, Environment, StrictUndefined
 
 from brakelab.report.look import DARK
+from brakelab.results.outputs import check_outputs
+from ecu.errors import UserError
 
 PAGE: Final[Traversable] = files("brakelab.report") / "page.html.j2"
 PARTS: Final = ("brakings_table.html.j2", "brakes_section.html.j2", "wear_section.html.j2")
@@ -28,6 +31,13 @@ class Tile(NamedTuple):
     unit: str
     note: str
     warns: bool = False
+
+
+def check_page(out: Path, read: Sequence[Path]) -> None:
+    """Refuse a page that would not end in .html or replace a file of `read`. Raises UserError."""
+    check_outputs(out, [out], read)
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise UserError("--out", str(out), "the report is a web page; let the name end in .html")
 
 
 def fixed(value: float, digits: int) -> str:

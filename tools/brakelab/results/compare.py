@@ -6,19 +6,19 @@ mask any difference matters.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 from rich.table import Table
 
 from brakelab.results.console import new_console
 from brakelab.results.files import Result, brakes_path, read_result
-from brakelab.results.prediction import errors
-from ecu.contract.signals import CORNERS, without_corner
+from brakelab.results.prediction import Errors, errors
+from ecu.contract.faults import WORDS, fault_mask, fault_names
+from ecu.contract.signals import CORNERS, STARTING, without_corner
 from ecu.errors import UserError
 from ecu.output import give
 
@@ -68,6 +68,87 @@ class Difference(NamedTuple):
     """Greatest difference over the least that matters; above 1 it does."""
 
 
+class Part(NamedTuple):
+    """Rows, or brake applications, that two results have in common."""
+
+    title: str
+    before: Columns
+    after: Columns
+    units: Mapping[str, str]
+    only: tuple[int, int]
+    """How many only the one and only the other has."""
+    differences: list[Difference]
+
+    @property
+    def matter(self) -> int:
+        """Number of columns whose difference matters."""
+        return sum(row.weight > 1.0 for row in self.differences)
+
+    def worst(self) -> list[Difference]:
+        """Return what matters, of each quantity the corner that differs most."""
+        by_quantity: dict[str, Difference] = {}
+        for row in self.differences:
+            if row.weight > 1.0:
+                by_quantity.setdefault(without_corner(row.name), row)
+        return list(by_quantity.values())
+
+    def place(self, difference: Difference) -> str:
+        """Return where the greatest difference is: time or application, and corner."""
+        row = difference.place
+        if self.title == BRAKES:
+            return f"braking {self.before['brake'][row] + 1:.0f} {self.before['corner'][row]}"
+        corner = difference.name[len(without_corner(difference.name)) + 1 :]
+        return f"{self.before['t'][row]:.2f} s {corner}".rstrip()
+
+
+class Judged(NamedTuple):
+    """What a user compares first."""
+
+    prediction: Errors
+    front: float
+    """Friction after the last brake application [-]."""
+    rear: float
+
+    def text(self) -> tuple[str, str]:
+        """Return how far the predictions were off, and the friction at the end."""
+        off = "no brake application to judge it by"
+        if self.prediction.counted:
+            mean, bias = 100.0 * self.prediction.mean, 100.0 * self.prediction.bias
+            off = f"{mean:.1f} % on the mean, bias {bias:+.1f} %"
+        return off, f"{self.front:.3f} front, {self.rear:.3f} rear"
+
+
+class Comparison(NamedTuple):
+    """Two results side by side."""
+
+    provenance: list[str]
+    """Version, configuration and logs, where they differ."""
+    judged: tuple[Judged, Judged] | None
+    """None without brake applications."""
+    parts: list[Part]
+
+    faults: tuple[list[str], list[str]]
+    """Seen by only the one, and by only the other."""
+
+    @property
+    def verdicts(self) -> list[str]:
+        """Error of prediction and friction at the end of both, and faults that only one has seen."""
+        lines = []
+        if self.judged is not None:
+            names = ("prediction off by", "friction at the end")
+            pairs = zip(names, *(one.text() for one in self.judged), strict=True)
+            lines = [f"{name}: {before} -> {after}" for name, before, after in pairs]
+        if any(self.faults):
+            before, after = (", ".join(names) or "none" for names in self.faults)
+            lines.append(f"faults that only one has: {before} -> {after}")
+        return lines
+
+    @property
+    def matter(self) -> int:
+        """Number of differences that matter."""
+        return sum(part.matter + bool(any(part.only)) for part in self.parts)
+
+
 def _threshold(name: str, unit: str, values: NDArray[np.float64]) -> float:
     if without_corner(name) in EXACT:
         return 0.5
@@ -113,27 +194,6 @@ def _taken(columns: Columns, rows: NDArray[np.int64]) -> Columns:
     return {name: column[rows] for name, column in columns.items()}
 
 
-def _show(
-    console: Console, title: str, of: list[Difference], units: Mapping[str, str], at: list[str]
-) -> None:
-    table = Table(title=title, title_justify="left", highlight=True)
-    for column in ("quantity", "unit", "rms", "greatest", "at", "only in one", "times what matters"):
-        table.add_column(
-            column, justify="left" if column in ("quantity", "unit", "at") else "right", no_wrap=True
-        )
-    for row, place in zip(of, at, strict=True):
-        table.add_row(
-            without_corner(row.name),
-            units.get(row.name, ""),
-            "" if np.isnan(row.rms) else f"{row.rms:.3g}",
-            "" if np.isnan(row.greatest) else f"{row.greatest:+.3g}",
-            place,
-            str(row.nulls or ""),
-            f"{row.weight:.1f}" if row.weight < 10 else f"{row.weight:.0f}",
-        )
-    console.print(table)
-
-
 def _provenance(a: Result, b: Result) -> list[str]:
     lines = []
     for key in PROVENANCE:
@@ -148,86 +208,103 @@ def _provenance(a: Result, b: Result) -> list[str]:
     return lines
 
 
-def _judged(brakes: Columns) -> tuple[str, str]:
-    """Return how far the predictions of a result were off, and its friction at the end."""
+def _judged(brakes: Columns) -> Judged:
     counts = (brakes["corner"] == CORNERS[0]) & (brakes["left_out"] == "")
-    off = "no brake application to judge it by"
-    if counts.any():
-        measured, predicted = (brakes[f"specific_force_{name}"][counts] for name in ("mean", "predicted"))
-        found = errors(measured.tolist(), predicted.tolist())
-        off = f"{100.0 * found.mean:.1f} % on the mean, bias {100.0 * found.bias:+.1f} %"
-    last = [brakes["mu_b_end"][brakes["corner"] == corner][-1] for corner in CORNERS]
-    return off, f"{0.5 * (last[0] + last[1]):.3f} front, {0.5 * (last[2] + last[3]):.3f} rear"
+    measured, predicted = (brakes[f"specific_force_{name}"][counts] for name in ("mean", "predicted"))
+    last = [float(brakes["mu_b_end"][brakes["corner"] == corner][-1]) for corner in CORNERS]
+    found = errors(measured.tolist(), predicted.tolist())
+    return Judged(found, 0.5 * (last[0] + last[1]), 0.5 * (last[2] + last[3]))
 
 
-def _verdicts(a: Columns, b: Columns) -> list[str]:
-    """Return what a user compares first: errors of prediction and friction of both."""
-    if not all(len(one["corner"]) and "left_out" in one for one in (a, b)):  # an earlier version's
-        return []
-    names = ("prediction off by", "friction at the end")
-    pairs = zip(names, _judged(a), _judged(b), strict=True)
-    return [f"{name}: {before} -> {after}" for name, before, after in pairs]
-
-
-def compare(a: Path, b: Path) -> int:
-    """Print the differences of result `b` from `a`; return 1 if one matters, else 0.
+def find(a: Path, b: Path) -> Comparison:
+    """Return the differences of result `b` from `a`.
 
     Raises:
         UserError: a file cannot be read, is no result, or the two have no row in common.
     """
-    console = new_console()
-    matters, listed = 0, []
     first, second = read_result(a), read_result(b)
     for path, result in ((a, first), (b, second)):
         if "t" not in result.columns or "mu_b_fl" not in result.columns:
             raise UserError(str(path), "columns", "no result; give what `brake-ecu replay` wrote")
-    for line in _provenance(first, second):
-        console.print(line, highlight=False)
-    pairs = [("rows", first, second, _row_keys)]
+    rows = _part("rows", first, second, _row_keys)
+    if not len(rows.before["t"]):
+        raise UserError(str(b), "t", f"has no row in common with {a}; compare results of one drive")
+    parts, judged = [rows], None
     if brakes_path(a).exists() and brakes_path(b).exists():
         brakes = read_result(brakes_path(a)), read_result(brakes_path(b))
-        pairs += [(BRAKES, *brakes, _brake_keys)]
-        for line in (verdicts := _verdicts(*(one.columns for one in brakes))):
+        parts.append(_part(BRAKES, *brakes, _brake_keys))
+        a_brakes, b_brakes = (one.columns for one in brakes)
+        if all(
+            len(one["corner"]) and "left_out" in one for one in (a_brakes, b_brakes)
+        ):  # no earlier version's
+            judged = _judged(a_brakes), _judged(b_brakes)
+    return Comparison(_provenance(first, second), judged, parts, _faults(rows))
+
+
+def _faults(rows: Part) -> tuple[list[str], list[str]]:
+    a, b = (_seen(columns) for columns in (rows.before, rows.after))
+    return fault_names(a & ~b), fault_names(b & ~a)
+
+
+def _seen(columns: Columns) -> int:
+    """Return the mask of every fault since the ECU has started."""
+    words = {word: columns.get(word, np.full(len(columns["t"]), np.nan)) for word in WORDS}
+    return int(np.bitwise_or.reduce(np.where(columns["mode"] == STARTING, 0, fault_mask(words))))
+
+
+def _part(title: str, one: Result, other: Result, keys: Callable[[Columns], NDArray[np.int64]]) -> Part:
+    own, others = keys(one.columns), keys(other.columns)
+    both, rows_a, rows_b = np.intersect1d(own, others, return_indices=True)
+    before, after = _taken(one.columns, rows_a), _taken(other.columns, rows_b)
+    only = len(own) - len(both), len(others) - len(both)
+    return Part(title, before, after, one.units, only, differences(before, after, one.units))
+
+
+def show(found: Comparison, a: Path, b: Path) -> None:
+    """Print the differences of result `b` from `a`, and give them to `--json`."""
+    console = new_console()
+    for line in found.provenance + found.verdicts:
+        console.print(line, highlight=False)
+    if found.verdicts:
+        give(verdicts=found.verdicts)
+    listed = []
+    for part in found.parts:
+        if any(part.only):
+            line = f"{part.title}: {part.only[0]} only in {a}, {part.only[1]} only in {b}"
             console.print(line, highlight=False)
-        give(verdicts=verdicts)
-    for title, one, other, keys in pairs:
-        own, others = keys(one.columns), keys(other.columns)
-        both, rows_a, rows_b = np.intersect1d(own, others, return_indices=True)
-        only_a, only_b = len(own) - len(both), len(others) - len(both)
-        if not len(both) and title != BRAKES:
-            raise UserError(str(b), "t", f"has no row in common with {a}; compare results of one drive")
-        if only_a or only_b:
-            console.print(f"{title}: {only_a} only in {a}, {only_b} only in {b}", highlight=False)
-            matters += 1
-        before, after = _taken(one.columns, rows_a), _taken(other.columns, rows_b)
-        units = one.units
-        found = differences(before, after, units)
-        heavy = [row for row in found if row.weight > 1.0]
-        matters += len(heavy)
-        light = len(found) - len(heavy)
-        equal = len(set(before) & set(after)) - len(found)
-        by_quantity: dict[str, Difference] = {}
-        for row in heavy:
-            by_quantity.setdefault(without_corner(row.name), row)
-        worst = list(by_quantity.values())
+        if part.matter:
+            console.print(_table(part))
+        light = len(part.differences) - part.matter
+        equal = len(set(part.before) & set(part.after)) - len(part.differences)
+        line = f"{part.title}: {part.matter} columns differ, {light} by less than matters, {equal} are equal"
+        console.print(line, highlight=False)
         listed += [
-            row._asdict() | {"of": title, "unit": units.get(row.name, ""), "at": _place(title, before, row)}
-            for row in found
+            row._asdict() | {"of": part.title, "unit": part.units.get(row.name, ""), "at": part.place(row)}
+            for row in part.differences
         ]
-        if worst:
-            places = [_place(title, before, row) for row in worst]
-            _show(console, f"{title} that differ, by their worst corner", worst, units, places)
-        console.print(
-            f"{title}: {len(heavy)} columns differ, {light} by less than matters, {equal} are equal",
-            highlight=False,
+    give(matter=found.matter, provenance=found.provenance, differences=listed)
+
+
+def _table(part: Part) -> Table:
+    title = f"{part.title} that differ, by their worst corner"
+    table = Table(title=title, title_justify="left", highlight=True)
+    for column in ("quantity", "unit", "rms", "greatest", "at", "only\nin one", "times what\nmatters"):
+        table.add_column(
+            column, justify="left" if column in ("quantity", "unit", "at") else "right", no_wrap=True
         )
-    give(matter=matters, provenance=_provenance(first, second), differences=listed)
-    return 1 if matters else 0
+    for row in part.worst():
+        table.add_row(*cells(part, row))
+    return table
 
 
-def _place(title: str, columns: Columns, difference: Difference) -> str:
-    row = difference.place
-    if title == BRAKES:
-        return f"braking {columns['brake'][row] + 1:.0f} {columns['corner'][row]}"
-    corner = difference.name[len(without_corner(difference.name)) + 1 :]
-    return f"{columns['t'][row]:.2f} s {corner}".rstrip()
+def cells(part: Part, row: Difference) -> tuple[str, ...]:
+    """Return a difference as text: quantity, unit, rms, greatest, place, nulls, weight."""
+    return (
+        without_corner(row.name),
+        part.units.get(row.name, ""),
+        "" if np.isnan(row.rms) or row.name in WORDS else f"{row.rms:.3g}",
+        "" if np.isnan(row.greatest) or row.name in WORDS else f"{row.greatest:+.3g}",
+        part.place(row),
+        str(row.nulls or ""),
+        f"{row.weight:.1f}" if row.weight < 10 else f"{row.weight:.0f}",
+    )
