@@ -98,6 +98,22 @@ def test_simulate_fails_by_a_limit_that_is_not_kept(
     assert lines[1] == f"passed: {KEPT} (found: never)"
 
 
+def test_an_expectation_counts_from_when_the_fault_began(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lost = 'kind = "lost"\nt = 0.0\nwhen = "vehicle_speed < {}"\nduration = 0.5\nmessage = ["Imu"]'
+    expected = '[[expect]]\nwhat = "bit"\nbit = "IMU lost"\nwithin = 0.15'
+    codes = {}
+    for speed in ("5", "-5"):  # the second never
+        path = tmp_path / f"below{speed}.toml"
+        path.write_text(f"{STOP}\n[[fault]]\n{lost.format(speed)}\n{expected}\n")
+        codes[speed] = cli.main(["simulate", str(path), "--config", "suv", "--out", str(tmp_path / "drive")])
+    assert codes == {"5": 0, "-5": 1}
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("passed: IMU lost within 0.15 s of fault 1 (found: after 0.")
+    assert lines[1] == "FAILED: IMU lost within 0.15 s of fault 1 (found: never)"
+
+
 @pytest.mark.usefixtures("undrawn")
 def test_a_shipped_scenario_passes_and_fails_by_a_time_out_that_is_shorter_than_the_ecu_has(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -1,5 +1,6 @@
 """Every kind of fault: what it does to frames, signals and the car, and what the ECU makes of it."""
 
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ import pytest
 
 from brakelab.simulation.closed_loop import Drive, Loop, new_loop, run
 from brakelab.simulation.fault_kernels import HELD, deliver, new_link
-from brakelab.simulation.faults import KEYS, KINDS, Fault, fault_records
+from brakelab.simulation.faults import KEYS, KINDS, Fault, begun, fault_records
 from brakelab.simulation.outages import START_UP
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.vehicle_bus import new_noise
@@ -327,9 +328,42 @@ def test_a_killed_daemon_is_silent_and_knows_its_friction_afterwards(
 
 
 @pytest.mark.parametrize(
+    ("when", "reached"),
+    [
+        ("vehicle_speed < 12", lambda truth: truth["vehicle_speed"] < 12.0),
+        ("vehicle_speed<18", lambda truth: truth["vehicle_speed"] < 18.0),  # before t: at t
+        ("accel_x < -2.0", lambda truth: truth["accel_x"] < -2.0),
+        ("vehicle_speed > 40.5", None),
+    ],
+)
+def test_a_fault_begins_when_its_condition_holds(tmp_path: Path, when: str, reached: Any) -> None:
+    """At `t` = 2 s at the soonest, and for its duration of 1 s, whether the condition still holds or not."""
+    fault = f'kind = "set"\nsignal = ["accel_y"]\namount = 5.0\nwhen = "{when}"'
+    _, drive = driven(tmp_path, fault)
+    acting = drive.truth["fault_acting"] == 1.0
+    spoilt = drive.inputs["accel_y"] > 4.0
+    if reached is None:
+        assert not acting.any()
+        assert not spoilt.any()
+        (began,) = begun(load_scenario(tmp_path / "stop.toml").fault, drive.t, drive.truth["fault_acting"])
+        assert math.isinf(began.t)
+        return
+    first = drive.t[reached(drive.truth) & (drive.t > 2.0 - 1e-6)][0]
+    assert drive.t[acting][0] == pytest.approx(first, abs=0.06)  # by what the sensor reads
+    assert acting.sum() == 100 or acting[-1]
+    assert drive.t[spoilt][0] == pytest.approx(drive.t[acting][0], abs=0.02)
+    (began,) = begun(load_scenario(tmp_path / "stop.toml").fault, drive.t, drive.truth["fault_acting"])
+    assert (began.t, began.end) == pytest.approx((drive.t[acting][0], drive.t[acting][0] + 1.0))
+
+
+@pytest.mark.parametrize(
     ("fault", "line"),
     [
         ('kind = "broken"', "fault.0.kind"),
+        ('kind = "lost"\nwhen = "slow"', "'slow' is no condition; write it as vehicle_speed < 15"),
+        ('kind = "lost"\nwhen = "speed < 15"', "'speed' is not one of the ECU's inputs"),
+        ('kind = "lost"\nwhen = "wheel_speed < 15"', "'wheel_speed' is not one of"),
+        ('kind = "bus_off"\nwhen = "vehicle_speed < 15"', "when does not belong to the kind 'bus_off'"),
         ('kind = "late"', "'late' needs delay"),
         ('kind = "stuck"', "'stuck' needs signal"),
         ('kind = "lost"\nsignal = ["accel_x"]', "signal does not belong to the kind 'lost'"),

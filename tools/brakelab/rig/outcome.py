@@ -16,7 +16,7 @@ from brakelab.rig.reaction import Reaction, raised_alone
 from brakelab.rig.results import Frames, Written
 from brakelab.rig.verdicts import Verdict, judge
 from brakelab.simulation.closed_loop import new_loop, run
-from brakelab.simulation.faults import Fault
+from brakelab.simulation.faults import Fault, begun
 from brakelab.simulation.scenario import Scenario
 from ecu.contract.faults import FAULTS, fault_mask, fault_names
 from ecu.settings.config import Config
@@ -115,13 +115,14 @@ def outcome(
     drive = read_drive(written.result, ("vehicle_speed",), _REMEDY)
     own = read_drive(truth_path, ("vehicle_speed",), _REMEDY)
     found = brakings(drive, written.result)
-    seen = figures(drive, own, truth_path, found, scenario.fault)
+    faults = begun(scenario.fault, own.t, own.column("fault_acting"))
+    seen = figures(drive, own, truth_path, found, faults)
     longer = sound.longer(seen.stop.distance)
     timings = [read_timing(folder) for folder in recordings]
     lateness = np.concatenate([timing.lateness for timing in timings]) if timings else np.array([np.nan])
     expected = {one.fault_bit.name for one in scenario.expect if one.what == "bit"}
     usual = sound.faults | expected
-    alone, of_linings = account_for(seen.drive, own, scenario.fault, vehicle, usual)
+    alone, of_linings = account_for(seen.drive, own, faults, vehicle, usual)
     return Outcome(
         scenario=name,
         seconds=float(own.t[-1]),
@@ -135,7 +136,7 @@ def outcome(
         unexplained=alone,
         of_linings=of_linings,
         reactions=seen.reactions,
-        verdicts=judge(scenario.expect, seen, longer, scenario.fault),
+        verdicts=judge(scenario.expect, seen, longer, faults),
         frames=written.frames,
         differing=written.differing,
         cycles=len(drive.t),

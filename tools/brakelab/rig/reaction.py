@@ -120,7 +120,7 @@ def _reaction(drive: DriveResult, truth: DriveResult, fault: Fault) -> Reaction:
         kind=fault.kind,
         what=", ".join([*fault.message, *fault.signal]),
         t=fault.t,
-        duration=end - fault.t,
+        duration=end - fault.t if math.isfinite(fault.t) else math.nan,
         bits=raised(drive, fault.t, end + AFTER_S),
         mode=MODES[worst],
         mode_after=first_after(drive.t, within & (mode == worst) & (mode >= DEGRADED), fault.t),

@@ -15,6 +15,7 @@ from brakelab.rig.outcome import undisturbed
 from brakelab.rig.verdicts import Verdict, judge
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.expectations import Expectation
+from brakelab.simulation.faults import begun
 from brakelab.simulation.scenario import Scenario
 from brakelab.simulation.simulate import Simulated
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
@@ -51,11 +52,12 @@ def _where_it_lives(t: Vector, outputs: Mapping[str, Vector]) -> DriveResult:
 def verdicts(driven: Driven, expected: Sequence[Expectation]) -> list[Verdict]:
     """Return the verdict on each expectation; for "longer_stop" the drive without faults is driven, too."""
     drive, scenario = driven.drive, driven.scenario
-    seen = figures(drive, driven.truth, driven.path, brakings(drive, driven.path), scenario.fault)
+    faults = begun(scenario.fault, driven.truth.t, driven.truth.column("fault_acting"))
+    seen = figures(drive, driven.truth, driven.path, brakings(drive, driven.path), faults)
     longer = math.nan
     if any(one.what == "longer_stop" for one in expected):
         longer = undisturbed(scenario, driven.vehicle, driven.seed).longer(seen.stop.distance)
-    return judge(expected, seen, longer, scenario.fault)
+    return judge(expected, seen, longer, faults)
 
 
 def judge_simulated(simulated: Simulated, seed: int) -> int:

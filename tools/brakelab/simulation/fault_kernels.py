@@ -38,6 +38,7 @@ SLACK: Final = 1e-4  # s by which the sum of all steps may fall short of a cycle
 HELD: Final = 256  # delayed frames at a time
 BEHIND: Final = 1e-6  # s
 ROOM: Final = 512  # frames that arrive in one cycle
+MASKED: Final = 52  # bits of a whole number in a float
 
 
 class Link(NamedTuple):
@@ -208,6 +209,28 @@ def _delay_signal(fault: Record, place: int, on: bool, values: NDArray[np.float6
 
 
 @kernel
+def begin_faults(faults: Any, t: float, values: NDArray[np.float64]) -> None:
+    """Let the faults begin whose condition holds at `t` [s]; `values` before faults, shape (N_INPUTS,)."""
+    for j in range(len(faults)):
+        fault = faults[j]
+        if fault.watched < 0 or not math.isinf(fault.begin) or t + SLACK < fault.soonest:
+            continue
+        if fault.sign * (values[fault.watched] - fault.threshold) > 0.0:  # not where it is NaN
+            fault.begin, fault.end = t, t + fault.duration
+
+
+@kernel
+def acting(faults: Any, t: float) -> float:
+    """Return the mask of the faults that act at `t` [s]: 1 for the first."""
+    mask, bit = 0.0, 1.0
+    for j in range(min(len(faults), MASKED)):
+        if is_on(faults[j], t):
+            mask += bit
+        bit *= 2.0
+    return mask
+
+
+@kernel
 def spoil_car(
     faults: Any, t: float, noise: Generator, sound: Record, params: Record, values: NDArray[np.float64]
 ) -> None:
@@ -215,6 +238,7 @@ def spoil_car(
 
     `sound` are the car's parameters without a fault.
     """
+    begin_faults(faults, t, values)
     for i in range(4):
         params.motor_share[i] = sound.motor_share[i]
         params.pressure_limit[i] = sound.pressure_limit[i]

@@ -5,13 +5,15 @@ frame is intact.
 """
 
 import math
+import re
 from collections.abc import Sequence
 from functools import cache
-from typing import Annotated, Final, Literal, get_args
+from typing import Annotated, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from brakelab.arrays import Vector
 from ecu.bus.transmit import contract_transmit_plan
 from ecu.contract.records import RecordArray, new_record
 from ecu.contract.signals import CORNERS, INPUT, N_INPUTS
@@ -73,14 +75,22 @@ KEYS: Final[dict[str, set[str]]] = {
     "accumulator_low": {"amount"},
 }
 """Of each kind, beside `t` and `duration`."""
+_BY_PROCESS: Final = {"bus_off", "daemon_killed"}
+"""Kinds that the rig causes from outside of the vehicle, at a time that is known beforehand."""
+_CONDITION: Final = re.compile(r"(?P<signal>\w+)\s*(?P<sign>[<>])\s*(?P<value>[-+]?\d+(\.\d*)?)")
 _NEEDED: Final = {"delay", "signal", "amount", "rate", "limit"}
 
 LONGEST_DELAY: Final = 21  # cycles
 FAULT: Final = np.dtype(
     [
         ("kind", "i4"),
-        ("begin", "f8"),  # s
+        ("begin", "f8"),  # s, inf: its condition did not hold yet
         ("end", "f8"),
+        ("soonest", "f8"),  # s
+        ("duration", "f8"),
+        ("watched", "i4"),  # input of its condition, -1: none
+        ("sign", "f8"),  # 1: begins above `threshold`, -1: below
+        ("threshold", "f8"),
         ("share", "f8"),
         ("delay", "f8"),
         ("amount", "f8"),
@@ -120,7 +130,9 @@ class Fault(BaseModel):
     kind: Kind
     """What fails."""
     t: Annotated[float, Field(ge=0.0), Unit("s")]
-    """Since the car set off."""
+    """Since the car set off; with `when` at the soonest."""
+    when: str = ""
+    """Condition by which it begins, as `vehicle_speed < 15`: of an input before faults, in its unit."""
     duration: Annotated[float, Field(gt=0.0), Unit("s")] | None = None
     """Without it to the end of the drive."""
     message: list[str] = []
@@ -145,11 +157,15 @@ class Fault(BaseModel):
     @model_validator(mode="after")
     def _complete(self) -> "Fault":
         belongs = KEYS[self.kind]
-        given = self.model_fields_set - {"kind", "t", "duration"}
+        given = self.model_fields_set - {"kind", "t", "duration", "when"}
         for name in sorted(given - belongs):
             raise ValueError(f"{name} does not belong to the kind {self.kind!r}; remove it")
         for name in sorted(belongs & _NEEDED - given):
             raise ValueError(f"the kind {self.kind!r} needs {name}")
+        if self.when and self.kind in _BY_PROCESS:
+            raise ValueError(f"when does not belong to the kind {self.kind!r}; give t alone")
+        if self.when:
+            _condition(self.when)
         known = _messages()
         for name in self.message:
             if not any(name in of_sender for of_sender in known.values()):
@@ -182,11 +198,50 @@ def _places(name: str) -> list[int]:
     return [INPUT[one] for one in names if one in INPUT]
 
 
+class Condition(NamedTuple):
+    """Condition by which a fault begins."""
+
+    watched: int = -1
+    """Input, -1: none."""
+    sign: float = 1.0
+    """1: above the threshold, -1: below."""
+    threshold: float = 0.0
+
+
+def _condition(text: str) -> Condition:
+    """Return the condition in `text`, as `vehicle_speed < 15`. Raises ValueError if it is none."""
+    found = _CONDITION.fullmatch(text.strip())
+    if found is None:
+        raise ValueError(f"when: {text!r} is no condition; write it as vehicle_speed < 15")
+    if len(places := _places(found["signal"])) != 1:
+        raise ValueError(f"when: {found['signal']!r} is not one of the ECU's inputs; name one of one wheel")
+    return Condition(places[0], 1.0 if found["sign"] == ">" else -1.0, float(found["value"]))
+
+
+def begun(faults: Sequence[Fault], t: Vector, acting: Vector) -> list[Fault]:
+    """Return the faults with `t` when they began, inf: never.
+
+    `acting` are the masks of acting faults at `t` [s] (`fault_acting` of the truth), shape (n,).
+    """
+    masks = np.nan_to_num(acting).astype(np.int64)
+    began = list(faults)
+    for place, fault in enumerate(faults):
+        if fault.when:
+            rows = np.flatnonzero(masks >> place & 1)
+            began[place] = fault.model_copy(update={"t": float(t[rows[0]]) if len(rows) else math.inf})
+    return began
+
+
 def fault_records(faults: Sequence[Fault]) -> RecordArray:
     """Return the faults for the kernels, `FAULT`, shape (n,)."""
     rows = new_record(FAULT, len(faults))
     for row, fault in zip(rows, faults, strict=True):
         row["kind"], row["begin"], row["end"] = KINDS.index(fault.kind), fault.t, fault.end
+        row["soonest"], row["duration"] = fault.t, fault.end - fault.t
+        condition = _condition(fault.when) if fault.when else Condition()
+        row["watched"], row["sign"], row["threshold"] = condition
+        if fault.when:
+            row["begin"] = row["end"] = math.inf
         row["share"], row["delay"], row["amount"] = fault.share, fault.delay, fault.amount
         ids = fault.ids()
         row["ids"][: len(ids)], row["n_ids"] = ids, len(ids)

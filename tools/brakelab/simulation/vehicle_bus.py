@@ -28,7 +28,7 @@ from brakelab.plant.sensors import body_accelerations, true_readings
 from brakelab.plant.vehicle import new_state
 from brakelab.plant.wear import pad_wear
 from brakelab.simulation.car_parameters import set_parameters
-from brakelab.simulation.fault_kernels import spoil_car
+from brakelab.simulation.fault_kernels import acting, spoil_car
 from brakelab.simulation.faults import fault_records
 from brakelab.simulation.scenario import Scenario
 from brakelab.simulation.scenario_car import scenario_plant, scenario_widths
@@ -69,6 +69,7 @@ _SCALAR_TRUTH: Final = (
     "position_y",
     "heading",
     "steering_angle",
+    "fault_acting",  # mask: 1 for the scenario's first fault, 2 for the second
     "demand_heard",  # 1: the ECU's pressure demands are obeyed, 0: the hydraulics brake on their own
 )
 _CORNER_TRUTH: Final = (
@@ -95,7 +96,7 @@ _UNITS: Final = {
     **{signal.name: signal.unit for signal in OUTPUT_SIGNALS},
     **dict.fromkeys(("distance", "position_x", "position_y", "rolling_radius"), "m"),
     **dict.fromkeys(("pitch", "grade", "heading"), "rad"),
-    **dict.fromkeys(("road_friction", "particles"), "-"),
+    **dict.fromkeys(("road_friction", "particles", "fault_acting"), "-"),
     "t": "s",
 }
 
@@ -248,7 +249,8 @@ def write_truth(vehicle: Vehicle, row: NDArray[np.float64]) -> None:
     row[13] = state.heading
     row[14] = driver.steering_angle
     demand = vehicle.demand[0]
-    row[15] = 1.0 if demand.pressure_valid == 1 and demand.pressure_age < DEMAND_TIMEOUT else 0.0
+    row[15] = acting(vehicle.faults, state.t)
+    row[16] = 1.0 if demand.pressure_valid == 1 and demand.pressure_age < DEMAND_TIMEOUT else 0.0
     for i in range(4):
         corner = _FIRST_CORNER + i
         row[corner] = state.mu_b[i]
