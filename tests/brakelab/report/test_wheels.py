@@ -50,6 +50,8 @@ def test_motors_share_while_braking_only() -> None:
         (of_corners("slip", np.full_like(T, -0.01)), {"slip-front", "slip-rear", "wheel-speed"}),
         (of_corners("motor_torque", np.zeros_like(T)), set()),
         ({"accelerator_position": np.full_like(T, 30.0)}, {"pedals"}),
+        ({"accel_y": np.sin(T)}, {"across"}),
+        ({"steering_angle": 0.1 * np.sin(T)}, {"yaw"}),
         (
             of_corners("motor_torque", np.full_like(T, 90.0))
             | of_corners("brake_torque", np.full_like(T, 9.0)),

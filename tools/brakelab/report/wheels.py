@@ -1,4 +1,4 @@
-"""Linked plots over a drive: slip and speeds of the wheels, torques of brakes and motors, pedals."""
+"""Linked plots over a drive: slip and speeds of the wheels, torques, pedals, what the car does across."""
 
 from typing import Any, Final
 
@@ -26,6 +26,7 @@ LEAST_TORQUE: Final = 100.0
 """N m of brakes and motors together, below which a share is noise."""
 ROLLS: Final = 10.0  # rad/s
 _LEAST_SLIP, _LEAST_KMH, _LEAST_TORQUE, _LEAST_PERCENT = 2.0, 10.0, 200.0, 20.0
+_LEAST_ACROSS, _LEAST_YAW = 1.0, 0.1
 _SIDES: Final = (("left", LEFT, "dashed"), ("right", RIGHT, "dotted"))
 # Label, colour, dash of each wheel's speed.
 _WHEELS: Final = {
@@ -39,6 +40,12 @@ _TORQUES: Final = (
     ("brakes", "brakes", ESTIMATE),
     ("motors_front", "motors front", STAGE_COLOURS[3]),
     ("motors_rear", "motors rear", STAGE_COLOURS[1]),
+)
+_ACROSS: Final = (("accel_y", "measured", ESTIMATE), ("accel_y_true", "true", INK))
+_YAW: Final = (
+    ("yaw_rate", "yaw rate [rad/s]", ESTIMATE),
+    ("yaw_rate_true", "true", INK),
+    ("steering_angle", "road wheels [rad]", DEMAND),
 )
 _PEDALS: Final = (("pedal", "brake", DEMAND), ("accelerator", "accelerator", STAGE_COLOURS[1]))
 
@@ -59,6 +66,8 @@ def plots_of_wheels(
         "motor-share": _few(
             source, span, "Motors' share [%]", _LEAST_PERCENT, (("share", "of the braking torque", ESTIMATE),)
         ),
+        "across": _few(source, span, "Lateral acceleration [m/s²]", _LEAST_ACROSS, _ACROSS),
+        "yaw": _few(source, span, "Yaw rate, steering", _LEAST_YAW, _YAW),
         "pedals": _few(source, span, "Pedals [%]", _LEAST_PERCENT, _PEDALS),
     }
 
@@ -92,6 +101,9 @@ def _lines(drive: DriveResult, truth: DriveResult | None) -> dict[str, Vector]:
                 lines[f"motors_{axle}"] = motors[:, wheels].sum(axis=1)
         lines["share"] = motors_share(drive)
         lines["brakes"] = drive.corners("brake_torque").sum(axis=1)
+    lines |= {name: drive.column(name) for name in ("accel_y", "yaw_rate", "steering_angle")}
+    if truth is not None:
+        lines |= {f"{name}_true": truth.column(name) for name in ("accel_y", "yaw_rate")}
     pedal = drive if drive.has("pedal_position") or truth is None else truth
     for name, values in (
         ("pedal", pedal.column("pedal_position")),
@@ -144,5 +156,6 @@ def _few(
     if label.endswith("[%]"):
         plot.y_range.start = 0.0
     for name, of, colour in lines:
-        draw_line(plot, source, name, of, colour, line_width=1.4)
+        dash = "dashed" if name.endswith("_true") else "solid"
+        draw_line(plot, source, name, of, colour, line_width=1.4, line_dash=dash)
     return plot
