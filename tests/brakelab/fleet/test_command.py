@@ -1,7 +1,9 @@
 """`brake-ecu fleet` as a user meets it, beside `brake-ecu replay --state` drive by drive."""
 
+import re
 import shutil
 from pathlib import Path
+from urllib.parse import unquote
 
 import fsspec
 import numpy as np
@@ -89,6 +91,10 @@ def test_a_fleet_is_its_drives_in_order(
     page = (out / "report.html").read_text("utf-8")
     assert "Drives that failed" in page
     assert "<script src=" not in page
+    linked = re.findall(r'<a href="(pages/[^"]*)">([^<]*)</a>', page)
+    assert [name for _, name in linked] == [f"{drive}.log" for drive in (*DRIVES, 2, 11)]
+    for address, name in linked:
+        assert f"Braking report: {name}" in (out / unquote(address)).read_text("utf-8")
 
     (mine / "two/10.log").write_bytes(whole)
     assert fleet([f"{mine}/*/*.log"], SUV, None, None, None, 2, out, rows=True) == 0

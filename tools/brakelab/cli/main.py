@@ -225,7 +225,7 @@ def fleet(
     workers: Annotated[
         int | None, option("N", "Number of local processes; default: one per core", min=1)
     ] = None,
-    rows: Annotated[bool, flag("--rows", "Keep the rows of every drive too: up to 1 GB per 15 h")] = False,
+    rows: Annotated[bool, flag("--rows", "Keep rows and page of every drive: up to 1 GB per 15 h")] = False,
 ) -> int:
     """Replay thousands of recorded drives in parallel. Exit code 1: drives failed."""
     from brakelab.fleet import command

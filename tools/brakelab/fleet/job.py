@@ -29,6 +29,8 @@ class Job:
     """Changes with the content of the logs."""
     rows: str
     """File of the rows, on a disk that client and workers share; empty: none."""
+    page: str = ""
+    """File of the drive's page, likewise."""
     pads: str = ""
     """Work on the pads before the drive, see `brakelab.fleet.manifest`."""
 

@@ -1,5 +1,5 @@
-"""The folder that a fleet leaves: `brakes/vehicle=…/<drive>.parquet`, with `--rows` `rows/` likewise, then
-`drives.parquet` and `report.html`.
+"""The folder that a fleet leaves: `brakes/vehicle=…/<drive>.parquet`, with `--rows` `rows/` and `pages/`
+likewise, then `drives.parquet` and `report.html`.
 
 A drive is complete once its file of brake applications exists: it appears last and atomically, and its
 metadata hold the drive's summary, the learned values, and the key of all inputs.
@@ -17,12 +17,21 @@ from brakelab.fleet.job import Job, Outcome, outcome_of
 
 def brakes_file(out: Path, vehicle: str, drive: str) -> Path:
     """Return the path of a drive's brake applications."""
-    return out / "brakes" / f"vehicle={quote(vehicle, safe='')}" / f"{quote(drive, safe='')}.parquet"
+    return _file(out, "brakes", vehicle, f"{quote(drive, safe='')}.parquet")
 
 
 def rows_file(out: Path, vehicle: str, drive: str) -> Path:
     """Return the path of a drive's rows."""
-    return out / "rows" / f"vehicle={quote(vehicle, safe='')}" / f"{quote(drive, safe='')}.parquet"
+    return _file(out, "rows", vehicle, f"{quote(drive, safe='')}.parquet")
+
+
+def page_file(out: Path, vehicle: str, drive: str) -> Path:
+    """Return the path of a drive's page."""
+    return _file(out, "pages", vehicle, f"{quote(drive, safe='')}.html")
+
+
+def _file(out: Path, kind: str, vehicle: str, name: str) -> Path:
+    return out / kind / f"vehicle={quote(vehicle, safe='')}" / name
 
 
 def standing(out: Path, job: Job) -> Outcome | None:
@@ -42,7 +51,8 @@ def keep(out: Path, outcome: Outcome) -> None:
     path = brakes_file(out, *names)
     if outcome.summary["fault"]:
         path.unlink(missing_ok=True)
-        rows_file(out, *names).unlink(missing_ok=True)
+        for written in (rows_file(out, *names), page_file(out, *names)):
+            written.unlink(missing_ok=True)
         return
     unfinished = path.with_name(f".{path.name}.unfinished")
     path.parent.mkdir(parents=True, exist_ok=True)

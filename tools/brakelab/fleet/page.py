@@ -4,11 +4,13 @@ from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
+from urllib.parse import quote
 
 import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool
 
 from brakelab.fleet.lines import FEW, lines_of_vehicles
+from brakelab.fleet.output import page_file
 from brakelab.fleet.statistics import (
     QUANTITIES,
     Note,
@@ -38,6 +40,7 @@ BINS: Final = 30
 def write_page(done: Sequence[Summary], out: Path) -> None:
     """Write the page on `done`, summaries of drives; it needs no other file. Raises UserError."""
     good = [row for row in done if not row["fault"]]
+    pages = [_page_of(out.parent, row) for row in good[:ROWS]]
     vehicles = per_vehicle(good)
     due = pads_due(good)
     weeks = {quantity.name: by_week(good, quantity.name) for quantity in QUANTITIES}
@@ -61,6 +64,8 @@ def write_page(done: Sequence[Summary], out: Path) -> None:
             "failed": [
                 Note(row["vehicle"], row["drive"], lines_of(row, "fault")) for row in done if row["fault"]
             ],
+            "drives_done": list(zip(good[:ROWS], pages, strict=True)),
+            "drives_left": max(len(good) - ROWS, 0),
             "noted": notes(good),
             "few": len(vehicles.names) <= FEW,
             "undated": sum(row["start_time"] is None for row in good),
@@ -72,6 +77,12 @@ def write_page(done: Sequence[Summary], out: Path) -> None:
         out.write_text(page, "utf-8")
     except OSError as error:
         raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
+
+
+def _page_of(folder: Path, row: Summary) -> str:
+    """Return the address of a drive's page, as seen from the fleet's; empty: there is none."""
+    page = page_file(folder, row["vehicle"], row["drive"])
+    return quote(page.relative_to(folder).as_posix()) if page.exists() else ""
 
 
 def _tiles(done: Sequence[Summary], good: Sequence[Summary], vehicles: Vehicles) -> list[Tile]:

@@ -17,7 +17,7 @@ from typing import Any, Final, NamedTuple
 from brakelab.fleet.cluster import Workers
 from brakelab.fleet.job import Job, Outcome, failed
 from brakelab.fleet.manifest import VehicleDrive
-from brakelab.fleet.output import keep, rows_file, standing
+from brakelab.fleet.output import keep, page_file, rows_file, standing
 from brakelab.fleet.task import replay_job
 from brakelab.replay.source import Source
 from ecu.errors import RunFault
@@ -66,9 +66,10 @@ class Chain:
     def job(self, out: Path, rows: bool) -> Job:
         """Return the job of the next drive."""
         drive, config, source, _, mark, _ = self.drives[self.place]
-        file = str(rows_file(out, drive.vehicle, drive.name)) if rows else ""
+        names = drive.vehicle, drive.name
+        files = (str(rows_file(out, *names)), str(page_file(out, *names))) if rows else ("", "")
         learned = self.learned.get(store_key(config), b"")
-        return Job(drive.vehicle, drive.name, drive.logs, config, source, learned, mark, file, drive.pads)
+        return Job(*names, drive.logs, config, source, learned, mark, *files, drive.pads)
 
     def finish(self, outcome: Outcome) -> dict[str, Any]:
         """Go to the next drive; return the summary of this one."""

@@ -22,6 +22,7 @@ from brakelab.replay.drive import replay_drive
 from brakelab.replay.log import log_hash
 from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable, transducer_line
 from brakelab.replay.quality import quality_lines
+from brakelab.report.command import report
 from brakelab.results.car import KEY as CAR
 from brakelab.results.car import car_of
 from brakelab.results.files import ResultWriter, brakes_table
@@ -68,7 +69,7 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
         if not path.exists():
             raise UserError(str(path), "", "no such file; give an existing log")
     with TemporaryDirectory(prefix="brake-ecu-fleet-") as folder:
-        file = Path(folder, "rows.parquet")
+        file = Path(folder, Path(job.rows).name or "rows.parquet")
         with ResultWriter(file, params) if job.rows else nullcontext() as writer:
 
             def write(t: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
@@ -94,6 +95,8 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
             names = ", ".join(group.name for group in NEEDED)
             raise RunFault(f"{paths[0]}: not one sample of the needed inputs was usable ({names})")
         if job.rows:
+            if job.page:
+                _draw_page(file, Path(job.page))
             _put(file, Path(job.rows))
     assert after is not None
     kept = job.learned if out_of_range(after, params[0]["mu_nominal"]) else after.tobytes()
@@ -114,6 +117,16 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
     table = brakes_table(book.brakes.rows)
     drives = pa.array([job.drive] * len(table), pa.string())
     return Outcome(summary, b"", kept), table.add_column(0, "drive", drives)
+
+
+def _draw_page(rows: Path, target: Path) -> None:
+    page = rows.with_suffix(".html")
+    try:
+        report(rows, None, page)
+    except UserError:  # too short: its summary is all there is to say
+        target.unlink(missing_ok=True)
+    else:
+        _put(page, target)
 
 
 def _put(file: Path, target: Path) -> None:

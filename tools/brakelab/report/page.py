@@ -60,6 +60,10 @@ def kmh(speed: float) -> str:
     return fixed(abs(speed) * 3.6, 0)
 
 
+def _known(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
 def embed(figures: Mapping[str, Any]) -> tuple[str, dict[str, str]]:
     """Return the script that draws the figures, and the place of each, by name."""
     if not figures:
@@ -82,7 +86,7 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    page.filters.update(fixed=fixed, percent=percent, signed_percent=signed_percent, kmh=kmh)
+    page.filters.update(known=_known, fixed=fixed, percent=percent, signed_percent=signed_percent, kmh=kmh)
     return page
 
 
