@@ -30,7 +30,8 @@ def drive(vehicle: str, name: str, remaining: tuple[float, ...], **more: Any) ->
         ("mu_b_front", "mu_b_rear", "prediction_error", "prediction_bias", "start_time")
     )
     row |= {"vehicle": vehicle, "drive": name, "logs": name, "notes": "", "fault": "", "config_hash": "suv",
-            "brake_energy": 5e5, "degraded": 0.0, "distance": 1e3, "duration": 60.0, "brakings": 4, "learned": 4,
+            "brake_energy": 5e5, "degraded": 0.0, "distance": 1e3, "duration": 60.0,
+            "brakings": 4, "learned": 4,
             "pads": packed(pads), "particle_mass_per_km": 5.0, "particles_per_km": None}  # fmt: skip
     return row | more
 

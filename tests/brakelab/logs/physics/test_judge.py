@@ -111,6 +111,14 @@ WRONG = [
 ]  # fmt: skip
 
 
+def test_an_ecu_that_compensates_unequal_linings_exchanges_no_axles(right: Samples) -> None:
+    """The same brake forces with front linings 40 % stronger and rear ones 40 % weaker than configured."""
+    samples = np.vstack([right, right])  # enough hard braking
+    times(PRESSURES[:2], 1.0 / 1.4)(samples)
+    times(PRESSURES[2:], 1.0 / 0.6)(samples)
+    assert [line for line in lines_of(samples, SUV) if "exchanged" in line] == []
+
+
 @pytest.mark.parametrize(("case", "change", "begins", "advises"), WRONG, ids=[case[0] for case in WRONG])
 def test_a_wrong_copy_gives_its_line_alone(right: Samples, case, change, begins, advises) -> None:
     wrong = right.copy()

@@ -6,7 +6,8 @@ Friction may be half or nearly twice the nominal one, so that only a scale beyon
 that road and tyres do not limit, and contradicts where the mean is beyond as well: friction that falls with
 pressure tilts the line; a wrong scale of one calliper shows against the other side of its axle
 (`sides`). Front and rear are exchanged if the rear wheels would have to bear more than the front ones for
-their load, and would not if they were exchanged: no car is built so.
+their load, and would bear what they do in other cars if they were exchanged: no car is built so. One whose
+ECU takes from strong front linings and gives to weak rear ones reads like that as mapped, but not exchanged.
 """
 
 from typing import Final, NamedTuple
@@ -31,6 +32,7 @@ HARD: Final = 2.5  # m/s^2, from which loads tell the axles apart
 ALIVE: Final = 0.4  # of the other axle's pressure: below, one has failed
 FREE: Final = 0.85  # of the greatest decelerations: below, tyres give most of what the linings ask for
 LIKELY: Final = 1.65  # scale by these alone that explains the rest by grip
+UNDERBRAKED: Final = 0.5  # of the front wheels' use of their load, that rear ones reach in cars as built
 OVERBRAKED: Final = 1.1  # of the front wheels' use of their load, that rear ones never reach
 
 
@@ -101,7 +103,7 @@ def _axles(pressures: Vector, change: Vector, rows: Rows, car: Car) -> list[str]
     mapped = rear_use(mean * car.brakes.decel_per_bar)
     exchanged = rear_use(mean[[2, 3, 0, 1]] * car.brakes.decel_per_bar)
     alive = mean[:2].sum() > ALIVE * mean[2:].sum()
-    if not (alive and mapped > OVERBRAKED and exchanged < 1.0 / OVERBRAKED):
+    if not (alive and mapped > OVERBRAKED and UNDERBRAKED < exchanged < 1.0 / OVERBRAKED):
         return []
     reason = f"the rear wheels would bear {mapped:.1f} times what the front ones do for their load"
     return [f"calliper_pressure_*: front and rear are exchanged: {reason}; exchange them"]
