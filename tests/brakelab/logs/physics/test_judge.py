@@ -112,10 +112,10 @@ WRONG = [
 
 
 def test_an_ecu_that_compensates_unequal_linings_exchanges_no_axles(right: Samples) -> None:
-    """The same brake forces with front linings 40 % stronger and rear ones 40 % weaker than configured."""
+    """The same brake forces with front linings 30 % stronger and rear ones 30 % weaker than configured."""
     samples = np.vstack([right, right])  # enough hard braking
-    times(PRESSURES[:2], 1.0 / 1.4)(samples)
-    times(PRESSURES[2:], 1.0 / 0.6)(samples)
+    times(PRESSURES[:2], 1.0 / 1.3)(samples)
+    times(PRESSURES[2:], 1.0 / 0.7)(samples)
     assert [line for line in lines_of(samples, SUV) if "exchanged" in line] == []
 
 
