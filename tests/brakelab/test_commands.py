@@ -7,7 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakelab.api import Result, Simulation, UserError, compare, identify, replay, simulate, suggest_map
+from brakelab.api import (
+    Result,
+    Simulation,
+    UserError,
+    check_map,
+    compare,
+    identify,
+    replay,
+    simulate,
+    suggest_map,
+)
 from ecu import cli
 
 ROOT = Path(__file__).parents[2]
@@ -87,3 +97,14 @@ def test_a_mistake_is_the_command_s(call: Any, says: str) -> None:
     with pytest.raises(UserError) as error:
         call()
     assert says in str(error.value)
+
+
+def test_a_map_is_checked_as_by_the_command(drive: Simulation, capsys: pytest.CaptureFixture[str]) -> None:
+    log = ROOT / "tests/data/mustang.log"
+    found = check_map(log, "mustang")
+    assert found == said(["map", "check", str(log), "--map", "mustang"], capsys)
+    assert [row["name"] for row in found["inputs"]][:2] == ["wheel_speed_fl", "wheel_speed_fr"]
+    inputs: dict[str, Any] = {name: {"column": name} for name in drive.inputs.columns if name != "t"}
+    turned = {"inputs": inputs | {"accel_x": {"column": "accel_x", "factor": -1.0}}}
+    wrong = check_map(drive.inputs.to_pandas(), turned, config="suv")["wrong"]
+    assert [line for line in wrong if line.startswith("accel_x: turned")]

@@ -17,14 +17,22 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from brakelab.commands import Comparison, Suggestion, compare, identify, suggest_map
+from brakelab.commands import (
+    Comparison,
+    Suggestion,
+    check_map,
+    compare,
+    identify,
+    suggest_map,
+)
 from brakelab.given import AnyPath, Log, given
 from brakelab.given import Map as AnyMap
 from brakelab.identify.config_file import Section, write_car
 from brakelab.replay.command import replay_into
 from brakelab.replay.needed import NEEDED, nothing_usable
 from brakelab.replay.quality import Findings, damage_lines
-from brakelab.replay.source import check_map, load_source
+from brakelab.replay.source import check_map as unused_columns
+from brakelab.replay.source import load_source
 from brakelab.report.brakings_table import notebook
 from brakelab.report.command import report as write_report
 from brakelab.report.drive import DriveResult
@@ -45,6 +53,7 @@ __all__ = [
     "Suggestion",
     "Table",
     "UserError",
+    "check_map",
     "compare",
     "identify",
     "load",
@@ -148,7 +157,7 @@ def _loaded(path: Path, map: Path | None) -> Drive:
     if not path.exists():
         raise UserError(str(path), "", "no such file; give an existing log")
     found, source = Findings(path), load_source(map)
-    unused = check_map(map, source, path) if map is not None else ""
+    unused = unused_columns(map, source, path) if map is not None else ""
     notes = [line for line in (source.left_out, unused) if line]
     samples = list(decoded(path, source, found))
     t_ns = np.array([stamp for stamp, _ in samples], np.int64)

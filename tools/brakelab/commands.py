@@ -95,6 +95,24 @@ def suggest_map(
         return Suggestion(run_command(["map", "suggest", files.log(log)], dbc=dbc, config=config, out=out))
 
 
+def check_map(log: Log, map: Map, *, config: AnyPath | None = None) -> dict[str, Any]:
+    """Check a map on a drive, as `map check`.
+
+    Args:
+        log: as for `load`.
+        map: likewise.
+        config: of the car, where it is known.
+
+    Returns:
+        "inputs", a row for what feeds each; "wrong", what physics contradict; "lags", "notes".
+
+    Raises:
+        UserError: a file is not right.
+    """
+    with given() as files:
+        return run_command(["map", "check", files.log(log)], map=files.map(map), config=config)
+
+
 def identify(
     model: str, data: Log | Sequence[Log], *, out: AnyPath, map: Map | None = None, **options: Any
 ) -> dict[str, Any]:
