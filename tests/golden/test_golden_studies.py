@@ -15,15 +15,14 @@ from brakelab.studies.study import Asked, Study
 
 from .reference import ROUNDED, check
 
+STUDIES = ("failures", "loggers", "recorded", "margins", "bound", "blending", "blocks", "ablation")
+
 
 @pytest.mark.parametrize(
     "name",
     [
         "friction",
-        *(
-            pytest.param(name, marks=pytest.mark.study)
-            for name in ("failures", "recorded", "margins", "bound", "blending", "blocks", "ablation")
-        ),
+        *(pytest.param(name, marks=pytest.mark.study) for name in STUDIES),
     ],
 )
 def test_a_study_gives_the_committed_tables(name: str, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ STUDIES: Final = {
         ENTRIES: "studies.entries.command",
         "ablation": "studies.accuracy.ablation",
         "bound": "studies.accuracy.bound",
+        "loggers": "studies.accuracy.loggers",
         "recorded": "studies.accuracy.recorded",
         "vehicle": "studies.accuracy.vehicle",
         "tuning": "studies.accuracy.tuning",

@@ -1,40 +1,53 @@
-"""The bench of recorded cars: what a logger writes, and that a bystander learns the sum from it."""
+"""The bench of recorded cars: goals on the one drive with brake applications, and cuts that teach nothing."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from brakelab.simulation.closed_loop import Drive
-from brakelab.studies.accuracy.recorded import LOGGERS, Logger, logger_columns, recorded_of, recorded_table
-from ecu.contract.records import FRAME, new_record
-from ecu.contract.signals import CORNERS
+from brakelab.studies.accuracy.recorded import (
+    FOLDER,
+    MUSTANG,
+    PASSES,
+    SIGMAS,
+    WORSE,
+    Pass,
+    application_table,
+    drive_passes,
+    other_table,
+    pass_table,
+)
+from ecu.errors import UserError
+
+ROOT = Path(__file__).parents[4]
 
 
 @pytest.fixture(scope="module")
-def car():
-    return recorded_of(2)
+def passes() -> list[Pass]:
+    return drive_passes(ROOT / FOLDER / MUSTANG, "mustang", PASSES)
 
 
-def test_a_logger_has_one_pressure_per_axle_at_20_hz_and_no_reference() -> None:
-    n = 100
-    names = [f"{stem}_{c}" for stem in ("wheel_speed", "calliper_pressure", "motor_torque") for c in CORNERS]
-    names += ["accel_x", "accel_y", "yaw_rate", "vehicle_speed", "pedal_pressed"]
-    inputs = {name: np.random.default_rng(1).normal(30.0, 1.0, n) for name in names}
-    columns = logger_columns(Drive(np.arange(n) * 0.01, inputs, {}, {}, new_record(FRAME)), Logger(10, False))
-    assert set(columns) == {*names[:8], "accel_x", "pedal_pressed"}
-    front = columns["calliper_pressure_fl"]
-    np.testing.assert_array_equal(front, columns["calliper_pressure_fr"])
-    assert np.flatnonzero(np.isfinite(front)).tolist() == list(range(0, n, 5))
-    assert front[20] == pytest.approx(inputs["calliper_pressure_fl"][16:21].mean())
-    assert np.isfinite(columns["accel_x"]).sum() == 10
+def test_no_pass_is_worse_than_the_first(passes: list[Pass]) -> None:
+    means = [100.0 * one.off.mean for one in passes]
+    print(means)
+    assert all(mean <= means[0] + WORSE for mean in means)
+    assert [line[-1] for line in pass_table(passes).rows] == ["met"] * PASSES
 
 
-def test_the_sum_is_learned_from_the_third_application_on(car) -> None:
-    """Seed 2: linings 20 % rougher than configured."""
-    for found in car:
-        assert found.sum_error < 8.0
-        assert found.predicted < 0.6 * found.others[0]  # the configured friction
-        assert found.inside > 80.0
+def test_what_came_is_within_what_was_said(passes: list[Pass]) -> None:
+    distances = np.concatenate([one.distances for one in passes])
+    assert len(distances) == 3 * PASSES
+    assert np.abs(distances).max() < SIGMAS
+    lines = application_table(passes).rows
+    assert [line[0] for line in lines] == ["1"] * 3 + ["2"] * 3 + ["3"] * 3
+    assert all(line[-1] == "met" for line in lines)
 
 
-def test_the_table_has_a_line_per_logger(car) -> None:
-    assert [line[0] for line in recorded_table([car]).rows] == list(LOGGERS)
+def test_cuts_of_other_cars_teach_nothing() -> None:
+    for line in other_table(ROOT / FOLDER).rows:
+        assert line[-2:] == ("0", "0.0"), line[0]
+
+
+def test_outside_of_a_checkout_it_says_what_is_missing(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="measure it in a checkout"):
+        drive_passes(tmp_path / MUSTANG, "mustang", 1)
