@@ -13,7 +13,7 @@ from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.physics.samples import Car
 from brakelab.logs.signal_batches import Columns, columns_of, rows_of, time_of
 from brakelab.logs.signal_file import check_seconds
-from brakelab.mapping.map_text import input_lines, radius_line
+from brakelab.mapping.map_text import input_lines, needs_radius, radius_line
 from brakelab.mapping.motion import Found
 from brakelab.mapping.names import converts
 from brakelab.mapping.series import FEWEST_FRAMES, Series
@@ -84,8 +84,7 @@ def column_map_text(
         lines.append(
             f'time = "{time}"' + ("" if known else '\ntime_unit = "s"  # CHECK: the file does not say')
         )
-    wheel = next(one.series for one in found if one.target == "wheel_speed_fl")
-    if not converts(wheel.unit, "rad/s"):
+    if needs_radius(found):
         lines.append(radius_line(car))
     lines += ["", "[inputs]"]
     for before, one in zip([None, *found], found, strict=False):

@@ -16,8 +16,8 @@ from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.physics.samples import ANY_CAR, Car, car_of
 from brakelab.mapping.columns import column_map_text, read_column_series
 from brakelab.mapping.drive_torque import motors
-from brakelab.mapping.map_text import input_lines, radius_line
-from brakelab.mapping.motion import Found, motion_of, wheel_speeds
+from brakelab.mapping.map_text import input_lines, needs_radius, radius_line
+from brakelab.mapping.motion import Found, motion_of, speeds, wheel_speeds
 from brakelab.mapping.names import COUNTING, converts, words
 from brakelab.mapping.physics import propose
 from brakelab.mapping.series import Series, read_series
@@ -53,8 +53,8 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
     others.
 
     Raises:
-        UserError: the log, the database, `config` or `out` is not right, or no wheel speeds were found,
-            against which everything else is judged.
+        UserError: the log, the database, `config` or `out` is not right, or no speed was found, against which
+            everything else is judged.
     """
     if out is not None:
         given = [log, *([dbc] if dbc else []), *(config_files(config) if config else [])]
@@ -74,13 +74,13 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
         say(line)
     found, drives = propose(series, car)
     if not found:
-        remedy = _speed_alone(series) or "give the database of this car"
-        raise UserError(str(dbc), "", f"names no four wheel speeds in {log}; {remedy}")
+        raise UserError(str(dbc), "", f"names no speed in {log}; give the database of this car")
     _refuse_unitless(dbc, found[0].series, "give it there", car)
     bus = found[0].series.bus
     here = [one for one in series if one.bus == bus]
     hints: list[str] = []
-    motion = motion_of(wheel_speeds(series), car)
+    told = speeds(series)
+    motion = motion_of(told, car)
     if not any(one.target.startswith("calliper_pressure") for one in found):
         torque = brake_torque(here, motion)
         if torque and params is not None:
@@ -89,7 +89,7 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
             name = f"{torque[0].message}.{torque[0].signal} [{torque[0].unit}]"
             remedy = f"a brake torque can stand in for pressures, {FORMULA}; --config CONFIG writes it"
             hints = [f"{name} follows the deceleration: {remedy}"]
-    if not any(one.target.startswith("motor_torque") for one in found):
+    if len(told) > 1 and not any(one.target.startswith("motor_torque") for one in found):
         found += motors(here, wheel_speeds(series), motion)
     strict = not any(one.series.message in overlapping for one in found)
     others = other_sources(found, here, motion, car)
@@ -114,29 +114,17 @@ def _warnings(found: list[Found]) -> list[str]:
     return [f"{name}: {warning}" for (_, warning), name in names.items() if warning]
 
 
-def _speed_alone(series: list[Series]) -> str:
-    """Return what to do with a log that has a speed of the car but not of its wheels; empty: it has none."""
-    names = [one.signal for one in series if not one.flag and converts(one.unit, "m/s")]
-    if not names:
-        return ""
-    return (
-        f"the speed of the car alone ({names[0]}) starts no estimate: record all four wheel speeds, "
-        "or name them in a map by hand (docs/signal-maps.md)"
-    )
-
-
 def _suggest_columns(log: Path, out: Path | None, car: Car) -> int:
     """Propose a map of the columns of a signal file, as `suggest` does of frames."""
     quality = SignalQuality()
     columns, series = read_column_series(log, quality)
     found, drives = propose(series, car)
     if not found:
-        among = f"no four wheel speeds by their names among {', '.join(columns.names[:SHOWN])}"
-        remedy = _speed_alone(series) or "write the map by hand (docs/signal-maps.md)"
-        raise UserError(str(log), "", f"{among}; {remedy}")
+        among = f"no speed by its name and unit among {', '.join(columns.names[:SHOWN])}"
+        raise UserError(str(log), "", f"{among}; write the map by hand (docs/signal-maps.md)")
     wheel = found[0].series
     _refuse_unitless(log, wheel, f'write it behind the names: "{wheel.signal} [km/h]"', car)
-    others = other_sources(found, series, motion_of(wheel_speeds(series), car), car)
+    others = other_sources(found, series, motion_of(speeds(series), car), car)
     _show(found, drives, others)
     for line in _warnings(found):
         say(line)
@@ -276,8 +264,7 @@ def map_text(
         lines.append("strict = false              # signals of this database overlap")
     if len(interfaces) > 1:
         lines.append(f'bus = "{interfaces[bus]}"')
-    wheel = next(one.series for one in found if one.target == "wheel_speed_fl")
-    if not converts(wheel.unit, "rad/s"):
+    if needs_radius(found):
         lines.append(radius_line(car))
     for message in dict.fromkeys(one.series.message for one in found):
         first = next(one.series for one in found if one.series.message == message)

@@ -2,6 +2,7 @@
 
 from brakelab.logs.physics.samples import Car
 from brakelab.mapping.motion import Found
+from brakelab.mapping.names import converts
 from ecu.bus.units import spelled
 
 
@@ -30,6 +31,11 @@ def input_lines(
     if after:
         entry += f", timeout = {after:g}"
     return [*lines, f"{one.target} = {{ {entry} }}"]
+
+
+def needs_radius(found: list[Found]) -> bool:
+    """Return whether there are wheel speeds, and they are speeds along the road."""
+    return any(one.target == "wheel_speed_fl" and not converts(one.series.unit, "rad/s") for one in found)
 
 
 def radius_line(car: Car) -> str:

@@ -1,6 +1,6 @@
-"""Motion of a car by its four wheel speeds, and what is known of the car beforehand."""
+"""Motion of a car by its four wheel speeds or its one speed, and what is known of the car beforehand."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -43,7 +43,7 @@ class Motion(NamedTuple):
     change: Vector
     """dv/dt [m/s^2]"""
     yaw_rates: tuple[Vector, ...]
-    """rad/s, positive to the left; of both axles, the front and the rear one"""
+    """rad/s, positive to the left; of both axles, the front and the rear one; 0 by one speed"""
     known: Rows
     """Where samples of all wheels are near."""
 
@@ -114,6 +114,25 @@ def wheel_speeds(series: Iterable[Series]) -> dict[str, Series]:
     return {} if best is None else {corner: best[corner] for corner in CORNERS}
 
 
+def vehicle_speed(series: Iterable[Series]) -> Series | None:
+    """Return the car's speed, by its name, of several the least coarse; None: no name speaks of it."""
+    named = [(score(one.signal, "vehicle_speed"), one) for one in series if _is_speed(one)]
+    fitting = [(points, -coarseness(one), place) for place, (points, one) in enumerate(named) if points >= 1]
+    return named[max(fitting)[2]][1] if fitting else None
+
+
+def _is_speed(one: Series) -> bool:
+    return not one.flag and converts(one.unit, "m/s") and not corner_of(one.signal)[0]
+
+
+def speeds(series: Sequence[Series]) -> dict[str, Series]:
+    """Return what tells the car's motion, by input: four wheel speeds, else the car's speed, else nothing."""
+    if wheels := wheel_speeds(series):
+        return {f"wheel_speed_{corner}": one for corner, one in wheels.items()}
+    one = vehicle_speed(series)
+    return {} if one is None else {"vehicle_speed": one}
+
+
 def _metres_per_second(series: Series, radius: float) -> Callable[[Vector], Vector]:
     unit = spelled(series.unit)
     if unit in CONVERSIONS["m/s"]:
@@ -123,15 +142,16 @@ def _metres_per_second(series: Series, radius: float) -> Callable[[Vector], Vect
     return lambda values: values * scale
 
 
-def motion_of(wheels: dict[str, Series], car: Car = ANY_CAR) -> Motion:
-    """Return how the car moved by its four wheel speeds."""
-    start = max(one.t[0] for one in wheels.values())
-    end = min(one.t[-1] for one in wheels.values())
+def motion_of(found: dict[str, Series], car: Car = ANY_CAR) -> Motion:
+    """Return how the car moved by what `speeds` found, which is something."""
+    start = max(one.t[0] for one in found.values())
+    end = min(one.t[-1] for one in found.values())
     t = np.arange(start, end, 1.0 / RATE)
-    metres = _metres_per_second(wheels["fl"], float(car.radius.mean()))
-    fl, fr, rl, rr = (smooth(np.abs(metres(on_grid(wheels[corner], t)))) for corner in CORNERS)
-    speed = 0.25 * (fl + fr + rl + rr)
+    metres = _metres_per_second(next(iter(found.values())), float(car.radius.mean()))
+    each = [smooth(np.abs(metres(on_grid(one, t)))) for one in found.values()]
+    speed = np.mean(each, axis=0)
+    fl, fr, rl, rr = each if len(each) == len(CORNERS) else each * len(CORNERS)
     front, rear = (fr - fl) / car.track, (rr - rl) / car.track
-    known = np.logical_and.reduce([is_near(one, t) for one in wheels.values()])
+    known = np.logical_and.reduce([is_near(one, t) for one in found.values()])
     change = np.where(known, np.gradient(speed, 1.0 / RATE), 0.0)
     return Motion(t, speed, change, (0.5 * (front + rear), front, rear), known)

@@ -34,6 +34,7 @@ _CORNERS: Final = (
 
 WORDS: Final = {
     "wheel_speed": ("whl", "wheel", "wss", "spd", "speed", "rad", "radgeschw", "raddrehzahl"),
+    "vehicle_speed": ("speed", "spd", "velocity", "vel", "gps", "geschw", "vehicle", "veh"),
     "accel_x": ("long", "lgt", "ax", "x", "longitudinal", "laengs", "längs", "accel"),
     "accel_y": ("lat", "ay", "y", "lateral", "quer", "accel"),
     "yaw_rate": ("yaw", "gier", "yawrate", "rate"),
@@ -65,6 +66,7 @@ _ASKED: Final = (
 )
 """Words of what somebody asks for, which is no measurement."""
 AGAINST: Final = {
+    "vehicle_speed": ("engine", "eng", "motor", "fan", "wind", "rate", "accuracy", "lat", "long", *_ASKED),
     "pedal_pressed": ("park", "epb", "accelerator", "gas", "throttle", "clutch", "fault", "hold", "lamp"),
     "accel_x": ("pedal", "gas", "throttle", "position", "pos", "percentage", *_ASKED),
     "accel_y": ("pedal", "gas", "throttle", "position", "pos", *_ASKED),

@@ -1,6 +1,7 @@
 """Signals that behave like the inputs of the ECU.
 
-Wheel speeds are known by their names and by going together; everything else is set against them:
+Wheel speeds are known by their names and by going together, the car's speed by its name where these lack;
+everything else is set against them, but curves only against wheel speeds:
 
     accel_x            dv/dt
     yaw_rate           (v_right - v_left) / track, both axles
@@ -21,7 +22,7 @@ from brakelab.logs.physics.samples import ANY_CAR, Car
 from brakelab.mapping.brakes import brakes, flags
 from brakelab.mapping.candidates import best_of, by_name, unit_of
 from brakelab.mapping.curves import curves
-from brakelab.mapping.motion import Found, Motion, contract_unit, motion_of, wheel_speeds
+from brakelab.mapping.motion import Found, Motion, contract_unit, motion_of, speeds
 from brakelab.mapping.scale import scale_of
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
@@ -83,25 +84,28 @@ def _curved(motion: Motion) -> bool:
 
 
 def propose(series: list[Series], car: Car = ANY_CAR) -> tuple[list[Found], bool]:
-    """Return what is proposed, wheel speeds first, and whether the car drove; empty without wheel speeds.
+    """Return what is proposed, speeds first, and whether the car drove; empty without wheel speeds and speed.
 
-    All of it comes from the bus that carries the wheel speeds. `car` gives lengths and brakes, where known.
+    All of it comes from the bus that carries the speeds. `car` gives lengths and brakes, where known.
     """
-    wheels = wheel_speeds(series)
-    if not wheels:
+    told = speeds(series)
+    if not told:
         return [], False
-    motion = motion_of(wheels, car)
-    here = [one for one in series if one.bus == wheels["fl"].bus]
-    found = [
-        Found(f"wheel_speed_{corner}", one, 1.0, 0.0, spelled(one.unit), "by their names", True)
-        for corner, one in wheels.items()
-    ]
+    motion = motion_of(told, car)
+    bus = next(iter(told.values())).bus
+    here = [one for one in series if one.bus == bus]
+    alone = len(told) == 1
+    evidence = "by its name; the log has no four wheel speeds" if alone else "by their names"
+    found = [Found(name, one, 1.0, 0.0, spelled(one.unit), evidence, True) for name, one in told.items()]
     if motion.drives:
         found += accel_x(here, motion)
-        found += curves(here, motion, car, {one.series.name for one in found})
+        taken = {one.series.name for one in found}
+        if not alone:
+            found += curves(here, motion, car, taken)
         if not _curved(motion):
             open_ = [name for name in CURVES if name not in {one.target for one in found}]
-            found += named_only(here, open_, "the drive has hardly a curve")
+            why = "no wheel speeds show the curves" if alone else "the drive has hardly a curve"
+            found += named_only([one for one in here if one.name not in taken], open_, why)
     else:
         found += named_only(here, ("accel_x", *CURVES), "the car stands")
     found += brakes(here, motion, car) + flags(here, motion)

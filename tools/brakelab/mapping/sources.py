@@ -153,11 +153,14 @@ def references(motion: Motion, car: Car) -> dict[str, Reference]:
     yaw = motion.yaw_rates[0]
     speed = np.maximum(motion.speed, MOVING)
     decel, gain = np.maximum(-motion.change, 0.0), np.maximum(motion.change, 0.0)
-    return {
-        "accel_x": Reference(motion.change, fast, "dv/dt"),
+    curves = {
         "yaw_rate": Reference(yaw, fast, "right less left wheels"),
         "accel_y": Reference(motion.speed * yaw, fast, "speed times yaw rate"),
         "steering_angle": Reference(np.arctan(car.wheelbase * yaw / speed), fast, "the curvature"),
+    }
+    return {
+        "accel_x": Reference(motion.change, fast, "dv/dt"),
+        **(curves if yaw.any() else {}),
         "calliper_pressure_fl": Reference(decel, moves, "deceleration", 1),
         "pedal_position": Reference(decel, moves, "deceleration", 1),
         "accelerator_position": Reference(gain, moves, "dv/dt", 1),
