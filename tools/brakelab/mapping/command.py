@@ -79,8 +79,8 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
     bus = found[0].series.bus
     here = [one for one in series if one.bus == bus]
     hints: list[str] = []
-    told = speeds(series)
-    motion = motion_of(told, car)
+    sent = speeds(series)
+    motion = motion_of(sent, car)
     if not any(one.target.startswith("calliper_pressure") for one in found):
         torque = brake_torque(here, motion)
         if torque and params is not None:
@@ -89,7 +89,7 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
             name = f"{torque[0].message}.{torque[0].signal} [{torque[0].unit}]"
             remedy = f"a brake torque can stand in for pressures, {FORMULA}; --config CONFIG writes it"
             hints = [f"{name} follows the deceleration: {remedy}"]
-    if len(told) > 1 and not any(one.target.startswith("motor_torque") for one in found):
+    if len(sent) > 1 and not any(one.target.startswith("motor_torque") for one in found):
         found += motors(here, wheel_speeds(series), motion)
     strict = not any(one.series.message in overlapping for one in found)
     others = other_sources(found, here, motion, car)

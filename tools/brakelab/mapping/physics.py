@@ -88,15 +88,15 @@ def propose(series: list[Series], car: Car = ANY_CAR) -> tuple[list[Found], bool
 
     All of it comes from the bus that carries the speeds. `car` gives lengths and brakes, where known.
     """
-    told = speeds(series)
-    if not told:
+    sent = speeds(series)
+    if not sent:
         return [], False
-    motion = motion_of(told, car)
-    bus = next(iter(told.values())).bus
+    motion = motion_of(sent, car)
+    bus = next(iter(sent.values())).bus
     here = [one for one in series if one.bus == bus]
-    alone = len(told) == 1
+    alone = len(sent) == 1
     evidence = "by its name; the log has no four wheel speeds" if alone else "by their names"
-    found = [Found(name, one, 1.0, 0.0, spelled(one.unit), evidence, True) for name, one in told.items()]
+    found = [Found(name, one, 1.0, 0.0, spelled(one.unit), evidence, True) for name, one in sent.items()]
     if motion.drives:
         found += accel_x(here, motion)
         taken = {one.series.name for one in found}
