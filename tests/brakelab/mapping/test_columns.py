@@ -87,9 +87,7 @@ def test_one_speed_stands_in_the_place_of_four_wheels(
     pd.DataFrame(columns).to_csv(log, index=False)
     assert cli.main(["map", "suggest", str(log), "--out", str(out)]) == 0
     said = capsys.readouterr().err
-    assert (
-        "accel_y: its name alone speaks for it, no wheel speeds show the curves: check sign" in said
-    )
+    assert "accel_y: its name alone speaks for it, no wheel speeds show the curves: check sign" in said
     text = out.read_text("utf-8")
     assert 'vehicle_speed = { column = "Speed" }' in text
     assert 'accel_x = { column = "Longitudinal Acceleration", factor = -1 }' in text
@@ -97,6 +95,9 @@ def test_one_speed_stands_in_the_place_of_four_wheels(
     assert "wheel_speed" not in text.replace("wheel speeds", "")
     assert "rolling_radius" not in text
     assert cli.main(["replay", str(log), "--config", "suv", "--map", str(out), "--out", str(result)]) == 0
+    said = capsys.readouterr().err
+    assert "wheel_speed_*: not mapped; the speed of the car, which shows no slip, stands for it" in said
+    assert "degraded" not in said
     brakes = pq.read_table(tmp_path / "result.brakes.parquet").to_pydict()
     assert "learned" in brakes["learning"]
 

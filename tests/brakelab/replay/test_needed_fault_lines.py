@@ -10,6 +10,8 @@ from brakelab.replay.quality import Findings
 from ecu.contract.faults import PEDAL_LOST, PRESSURE_LOST, WHEEL_SPEED_LOST
 from ecu.contract.signals import CORNERS, INPUT
 
+WHEELS = [f"wheel_speed_{corner}" for corner in CORNERS]
+
 
 @pytest.mark.parametrize(
     ("faulty", "by_fault", "said"),
@@ -29,7 +31,8 @@ from ecu.contract.signals import CORNERS, INPUT
     ids=["healthy", "a frame missing for 200 ms", "no pedal for most of it"],
 )
 def test_faults_are_reported_with_how_long_they_lasted(faulty, by_fault, said) -> None:
-    found = Findings(Path("d.log"), rows=1000, faulty_rows=faulty)
+    found = came(*WHEELS)
+    found.faulty_rows = faulty
     found.fault_rows.update(by_fault)
     assert fault_lines(found) == said
 
@@ -43,12 +46,29 @@ def came(*names: str) -> Findings:
 
 
 def test_missing_pressures_are_reported_once_and_not_as_a_fault() -> None:
-    found = came("accel_x", *(f"wheel_speed_{corner}" for corner in CORNERS))
+    found = came("accel_x", *WHEELS)
     found.faulty_rows = 980
     found.fault_rows[PRESSURE_LOST] = 980
     (line,) = needed_lines(found)
     assert line.startswith("d.log: no calliper pressure, so friction cannot be estimated")
     assert fault_lines(found) == []
+
+
+def test_one_speed_stands_for_wheels_that_are_not_mapped() -> None:
+    pressures = [f"calliper_pressure_{corner}" for corner in CORNERS]
+    for names, says in (
+        (
+            ["vehicle_speed"],
+            "wheel_speed_*: not mapped; the speed of the car, which shows no slip, stands for",
+        ),
+        ([], "wheel_speed_*: no sample in the whole log; fill this column"),
+    ):
+        found = came("accel_x", "pedal_position", *pressures, *names)
+        found.faulty_rows = 980
+        found.fault_rows[WHEEL_SPEED_LOST] = 980
+        (line,) = needed_lines(found)
+        assert says in line
+        assert fault_lines(found) == []
 
 
 @pytest.mark.parametrize(

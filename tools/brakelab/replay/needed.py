@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.replay.quality import Findings
-from ecu.contract.faults import DEGRADING, FAULTS, PRESSURE_LOST, REQUEST_LOST
+from ecu.contract.faults import DEGRADING, FAULTS, PRESSURE_LOST, REQUEST_LOST, WHEEL_SPEED_LOST
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import (
     ACCEL_X,
@@ -37,8 +37,9 @@ class Group(NamedTuple):
     """One of them is enough, and only what is mapped is missed."""
 
 
+WHEELS: Final = range(WHEEL_SPEED, WHEEL_SPEED + len(CORNERS))
 NEEDED: Final = (
-    Group("wheel_speed_*", tuple(range(WHEEL_SPEED, WHEEL_SPEED + 4))),
+    Group("wheel_speed_*", tuple(WHEELS)),
     Group("accel_x", (ACCEL_X,)),
     Group("calliper_pressure_*", tuple(range(CALLIPER_PRESSURE, CALLIPER_PRESSURE + 4))),
     Group("pedal_position, decel_demand", (PEDAL_POSITION, DECEL_DEMAND), alternatives=True),
@@ -57,8 +58,10 @@ HELPFUL: Final = (
     (Group("steering_angle", (STEERING_ANGLE,)), "cornering forces of the front axle are not separated"),
 )
 """Inputs that a car may lack, and the estimates that suffer without them."""
-STAND_IN: Final = {ACCEL_X: "the change of speed"} | dict.fromkeys(
-    range(CALLIPER_PRESSURE, CALLIPER_PRESSURE + len(CORNERS)), "that of another wheel"
+STAND_IN: Final = (
+    {ACCEL_X: "the change of speed"}
+    | dict.fromkeys(WHEELS, "the speed of the car, which shows no slip,")
+    | dict.fromkeys(range(CALLIPER_PRESSURE, CALLIPER_PRESSURE + len(CORNERS)), "that of another wheel")
 )
 NO_PRESSURE: Final = (
     "no calliper pressure, so friction cannot be estimated; map the pressures, or a brake torque "
@@ -141,6 +144,7 @@ def fault_lines(found: Findings) -> list[str]:
         return _percent(share) if share > MAJORITY else f"{1e-9 * CYCLE_NS * rows:.2f} s"
 
     reported = 0 if has_pressure(found) else PRESSURE_LOST
+    reported |= 0 if found.mapped[list(WHEELS)].any() else WHEEL_SPEED_LOST
     causes = [fault for fault in FAULTS if fault.bit & (DEGRADING | REQUEST_LOST) & ~reported]
     lasting = sorted(causes, key=lambda fault: -found.fault_rows[fault.bit])
     names = [
@@ -161,7 +165,8 @@ def _cause(found: Findings, place: int) -> str:
     known, signal = found.freshness[place], INPUT_SIGNALS[place]
     taken, outside, invalid = int(known["taken"]), int(known["outside"]), int(known["invalid"])
     if not taken + outside + invalid:
-        if not found.mapped[place] and place in STAND_IN:
+        alone = place in WHEELS and not found.mapped[VEHICLE_SPEED]
+        if not found.mapped[place] and place in STAND_IN and not alone:
             return f"not mapped; {STAND_IN[place]} stands for it"
         if found.reception is None:
             return "no sample in the whole log; fill this column"
