@@ -16,9 +16,10 @@ before them; the tolerance grows with the noise of the sensors and with the rang
 with least = max(LEAST_ERROR, NOISE sigma), sigma of a - w by the configured noise of the sensors.
 
 A reading beyond any road (`SLOPE`) that the torques contradict for a second is wrong as well, regardless of
-its history. From then on it is not used until it agrees with the wheels or with the torques as before, or
-with the wheels on the slope that was known (one that was late agreed with nothing just before), the longer
-the more often it has been wrong, or the car is at standstill, on an unknown slope. Where the drive torque is
+its history. From then on it is not used until it agrees with the wheels as before, with the torques (where
+friction, by `FORCE`, may not be what agrees), or with the wheels on the slope that was known (one that was
+late agreed with nothing just before), at `SHOWN` of the acceleration at the jump, for a scale does not show at
+rest, the longer the more often it has been wrong, or the car is at standstill, on an unknown slope. Where the drive torque is
 unreported or uncertain, the torques neither contradict nor confirm: a reading beyond any road by the wheels
 alone is doubted until it no longer is. One that reads forwards for `OPPOSED` blocks while the linings brake
 and the wheels slow down is wrong whatever the speed is taken for, which it may have misled. Otherwise no
@@ -68,6 +69,7 @@ ACCELERATION_STATE = np.dtype(
         ("usual", "f8"),  # a - w before the jump [m/s^2]
         ("usual_slope", "f8"),  # of the road, as it was known then [m/s^2]
         ("usual_force", "f8"),  # a - f before the jump [m/s^2]
+        ("shown_at", "f8"),  # magnitude of the wheels' acceleration at the jump [m/s^2]
         ("implausible", "u1"),
     ],
     align=True,
@@ -85,6 +87,7 @@ KNOWN_MOTORS = 0.1  # greatest relative error of a motor torque that still yield
 SLOPE, STEEP = 2.0, 1.5  # m/s^2, of a slope of 20 %, of 15 %
 DENIED = 1.0  # m/s^2
 SECOND, OPPOSED = 10, 3  # blocks
+SHOWN = 0.5  # of the acceleration at which it jumped: a scale shows at no lesser one
 AGAIN, AGREED = 0.5, 2  # of LEAST_ERROR; blocks after the first time, twice as many after each further
 OFTEN = 6
 STANDSTILL = 0.1  # m/s
@@ -172,9 +175,15 @@ def _before(mean: Record, j: int) -> float:
 
 
 @kernel
+def _wheels_accel(mean: Record, j: int) -> float:
+    """Return dv/dt now, v in column `j` [m/s^2]."""
+    return (mean[0, j] - mean[2, j]) / (2.0 * BLOCK_S)
+
+
+@kernel
 def _beside_wheels(mean: Record, j: int) -> float:
     """Return a - dv/dt now, v in column `j` [m/s^2]."""
-    return _now(mean, A) - (mean[0, j] - mean[2, j]) / (2.0 * BLOCK_S)
+    return _now(mean, A) - _wheels_accel(mean, j)
 
 
 @kernel
@@ -209,8 +218,11 @@ def _agrees(state: Record, witness: Record) -> bool:
     if state.known_blocks < 3:
         on_a_road: bool = compare(witness, ACCEL_X, against_wheels, SLOPE) < 1.0
         return on_a_road and state.good_blocks >= SECOND
+    if abs(_wheels_accel(mean, W)) < SHOWN * state.shown_at:
+        return False
     against_force = _now(mean, A) - _now(mean, F)
-    by_force = state.known_blocks >= SECOND and abs(against_force - state.usual_force) < least
+    unsure = FORCE * max(-_now(mean, F), 0.0)
+    by_force = state.known_blocks >= SECOND and abs(against_force - state.usual_force) + unsure < least
     by_wheels: bool = compare(witness, ACCEL_X, against_wheels - state.usual, least) < 1.0
     return by_force or by_wheels or abs(against_wheels - state.usual_slope) < least
 
@@ -279,6 +291,7 @@ def _judge(state: Record, witness: Record, slope: float, slowed: bool) -> None:
     if jumped or state.beyond >= SECOND or state.opposed >= OPPOSED:
         state.implausible, state.agreed, state.times = 1, 0, min(state.times + 1, OFTEN)
         state.usual_slope = slope
+        state.shown_at = abs(_wheels_accel(mean, W)) if jumped else 0.0
         state.usual = _usually_beside_wheels(mean, W) if jumped else 0.0
         state.usual_force = _before(mean, A) - _before(mean, F) if jumped else 0.0
 

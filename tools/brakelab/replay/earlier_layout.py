@@ -31,6 +31,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "unseen_s",
         "still_s",
         "opposed",
+        "shown_at",
         "noisy",
         "latest",
         "steady_s",

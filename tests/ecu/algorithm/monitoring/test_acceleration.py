@@ -138,6 +138,22 @@ def test_a_reading_is_believed_again_on_the_slope_that_was_known(params, feed, s
     assert said[-1] != again
 
 
+# force by the torques, on top of it: of car, of the reading
+STILL_WRONG = [
+    pytest.param(lambda t: -4.0 if t < 5.0 else 0.0, none, steps(0.8, JUMP, 5.0), id="a scale, rolling"),
+    pytest.param(lambda t: -4.0, steps(-0.8, 5.0), steps(0.8), id="a zero, linings rub more"),
+]
+
+
+@pytest.mark.parametrize(("force", "car", "reading"), STILL_WRONG)
+def test_a_reading_that_is_still_wrong_is_not_believed(
+    params, feed, force: Series, car: Series, reading: Series
+) -> None:
+    """A scale shows at no lesser deceleration; linings are no witness, for their friction changes."""
+    said = drive(params, feed, force, car, none, reading)
+    assert all(said[round(100 * JUMP) + 40 :])
+
+
 def test_it_is_believed_again_at_standstill(params, feed) -> None:
     said = drive(params, feed, lambda t: -8.0, none, none, steps(0.8, 2.0), seconds=4.5)
     assert said[round(100 * 30.0 / 8.0) - 50]
