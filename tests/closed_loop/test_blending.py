@@ -107,6 +107,17 @@ def test_a_motor_that_gives_less_than_its_limit_promises_is_reported(scenario, a
             assert reported[-1] > result.t[-1] - 0.2  # until the brakes are released
 
 
+@pytest.mark.parametrize("corners", [CORNERS[:1], CORNERS], ids=["one", "all"])
+def test_pressures_that_read_too_much_take_nothing_from_the_motors(corners: tuple[str, ...]) -> None:
+    """A lining that gives more than asked would have its motor give as much less."""
+    signals = [f"calliper_pressure_{corner}" for corner in corners]
+    lie = Fault.model_validate({"kind": "set", "t": LOSS, "signal": signals, "amount": 100.0})
+    found = changing(drive(faulty(lie), 0.4), blended(0.4))
+    print(found)
+    assert found.below < 2.0
+    assert found.above < 4.0
+
+
 def test_motors_that_only_fall_silent_hand_over_smoothly() -> None:
     for seed in SEEDS:
         found = changing(drive(faulty(MUTE), 0.8, seed), blended(0.8))

@@ -16,10 +16,10 @@ before them; the tolerance grows with the noise of the sensors and with the rang
 with least = max(LEAST_ERROR, NOISE sigma), sigma of a - w by the configured noise of the sensors.
 
 A reading beyond any road (`SLOPE`) that the torques contradict for a second is wrong as well, regardless of
-its history. From then on it is not used until it agrees with the wheels as before, with the torques (where
-friction, by `FORCE`, may not be what agrees), or with the wheels on the slope that was known (one that was
-late agreed with nothing just before), at `SHOWN` of the acceleration at the jump, for a scale does not show at
-rest, the longer the more often it has been wrong, or the car is at standstill, on an unknown slope. Where the drive torque is
+its history. From then on it is not used until it agrees with the wheels as before or on the slope that was
+known (one that was late agreed with nothing just before), or with the torques, where friction may be off by
+`FORCE`; each at `SHOWN` of the acceleration at the jump, for a scale shows at none less; the longer the more
+often it has been wrong. At standstill it is used again, on an unknown slope. Where the drive torque is
 unreported or uncertain, the torques neither contradict nor confirm: a reading beyond any road by the wheels
 alone is doubted until it no longer is. One that reads forwards for `OPPOSED` blocks while the linings brake
 and the wheels slow down is wrong whatever the speed is taken for, which it may have misled. Otherwise no

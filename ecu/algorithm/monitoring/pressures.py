@@ -45,6 +45,7 @@ OFFSET, RATIO = 3.0, 0.1  # bar, 1: no hydraulics and sensor that are sound diff
 LEAST_SCALED = 3.0  # bar, of a ratio's effect: at low pressures noise and zero are a ratio
 LARGEST_OFFSET, LARGEST_RATIO = 4.5, 0.15  # learned: a sensor that recovers is soon believed again
 FAR, FAR_SHARE = 8.0, 0.2  # bar, of the pressure: too far off for noise and lag
+ABOVE = 16.0  # bar, of one sample: noise of 3 bar that is cut off sooner is a bias
 KEPT, KEPT_SHARE = 0.6, 0.025  # bar, of the model: so much stays in a reading, of which it is the better one
 LEAST_FORCE, LEAST_SHARE = 0.05, 0.4  # of the weight, of the modelled force: a clear difference
 LEAST_SPEED = 1.0  # m/s: a car at standstill does not show its brakes' force
@@ -163,3 +164,13 @@ def lasting_difference(state: Record, i: int, model: float) -> float:
     lasting: float = state.offset[i] + state.ratio[i] * model
     kept = KEPT**2 + (KEPT_SHARE * model) ** 2
     return lasting - kept / lasting if lasting * lasting > kept else 0.0
+
+
+@kernel
+def beyond_noise(state: Record, pressure: float, model: float) -> bool:
+    """Return whether a reading less its zero is above the model [bar] by what one sample's noise never is.
+
+    Force that the car's deceleration does not show is not taken from the motors.
+    """
+    beyond: bool = not state.honest and pressure - model > ABOVE + FAR_SHARE * model
+    return beyond

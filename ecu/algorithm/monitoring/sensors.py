@@ -28,7 +28,12 @@ from ecu.algorithm.monitoring.motors import (
     watch_motors,
 )
 from ecu.algorithm.monitoring.plausibility import watch_pressures, watch_wheels, wheel_speed_implausible
-from ecu.algorithm.monitoring.pressures import DOUBT_S, compare_pressures, lasting_difference
+from ecu.algorithm.monitoring.pressures import (
+    DOUBT_S,
+    beyond_noise,
+    compare_pressures,
+    lasting_difference,
+)
 from ecu.algorithm.monitoring.speeds import SPEED, watch_speeds
 from ecu.algorithm.monitoring.turning import watch_turning
 from ecu.algorithm.monitoring.wheel_unit import watch_wheel_unit
@@ -176,7 +181,11 @@ def _mask_pressure(s: Record, u: Record, i: int, others: bool) -> None:
     if others:
         if s.pressures.wrong[i]:
             _distrust(s, u, place)
-    elif s.pressures.wrong[i] or s.plausibility.apart_s[i] > LEFT_OUT_S:
+    elif (
+        s.pressures.wrong[i]
+        or s.plausibility.apart_s[i] > LEFT_OUT_S
+        or beyond_noise(s.pressures, u.value[place] - s.estimate.pressure_zero[i], model)
+    ):
         u.value[place] = model + s.estimate.pressure_zero[i]
         leave_out(s.witness, place)
     elif not s.pressures.honest:

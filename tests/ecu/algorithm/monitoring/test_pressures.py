@@ -12,6 +12,7 @@ from ecu.algorithm.monitoring.pressures import (
     KEPT,
     KEPT_SHARE,
     PRESSURES_STATE,
+    beyond_noise,
     compare_pressures,
     lasting_difference,
 )
@@ -116,3 +117,12 @@ def test_a_reading_far_off_is_wrong_unless_the_deceleration_agrees_with_it(
     brakes.sensor = sensor
     brakes.hold(1.0, 50.0)
     assert brakes.state["wrong"].all() == wrong == brakes.state["wrong"].any(), name
+
+
+@pytest.mark.parametrize(
+    ("bar", "honest", "beyond"), [(0.0, 0, False), (39.0, 0, False), (41.0, 0, True), (41.0, 1, False)]
+)
+def test_one_sample_is_left_out_above_what_noise_can_be(bar: float, honest: int, beyond: bool) -> None:
+    state = np.zeros(1, PRESSURES_STATE)[0]
+    state["honest"] = honest
+    assert beyond_noise(state, bar, 20.0) == beyond
