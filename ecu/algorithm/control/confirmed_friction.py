@@ -8,7 +8,7 @@ the speed over ground; the force of all brakes is known otherwise:
 While r is at least `CONFIRMS`, the friction in use counts as confirmed. Below `LEAST_SHARE` what it has risen
 by since is taken back, until r is `AGREES`; where that is not enough, up to `LOWER` of the confirmed friction
 too: the linings have changed since. All is given again slowly. A friction that falls raises the pressure: it
-is followed.
+is followed, but where r is above `TOO_MUCH` already. What it has fallen by is then taken back slowly.
 
 Until a friction was confirmed, all of a rise is one over the base, and more than what is missing. Then what r
 will be once hydraulics and car have followed what is taken back already is predicted (a Smith predictor, with
@@ -37,6 +37,7 @@ CONFIRMED_STATE = np.dtype(
         ("pressed", "f8"),  # of that which the pressures have followed
         ("followed", "f8"),  # of that which `given` has followed
         ("steady_s", "f8"),
+        ("excess", "f8"),  # of r over `TOO_MUCH`, relative
         ("back", "f8"),  # share of an unconfirmed rise that is taken back; above 1, of `LOWER` too
     ],
     align=True,
@@ -51,6 +52,7 @@ TAKE, WIDTH = 10.0, 0.04  # 1/s at an error of `WIDTH`
 FIRST_WIDTH = 0.4  # until a friction was confirmed: no more than hydraulics and car can follow
 GIVE, GIVE_FAST, OVER = 0.05, 0.5, 1.04  # 1/s, 1/s where more than that is given
 LOWER, LOWERING = 0.3, 0.25  # of the friction, 1/s at an error of `WIDTH`: slow against the lag
+TOO_MUCH = 1.08  # r that zero and scale of the accelerometer do not explain
 FOLLOW_S, USUAL_S = 0.5, 30.0
 
 
@@ -79,6 +81,7 @@ def confirm_friction(
         slowness: of the hydraulics.
         dt: time since the last cycle [s].
     """
+    state.excess = 0.0
     state.usual += (accel_offset - state.usual) * min(dt / USUAL_S, 1.0)
     if not decel > LEAST_DECEL:
         state.asked = state.given = state.steady_s = 0.0
@@ -97,6 +100,7 @@ def confirm_friction(
         state.back += min(max(1.0 - state.back, -TAKE * dt), TAKE * dt)
     if state.steady_s < SETTLED_S * max(slowness, 1.0):
         return
+    state.excess = max(state.given / (TOO_MUCH * state.asked) - 1.0, 0.0)
     drifted = accel_offset - state.usual
     if state.back >= 1.0:
         drifted = max(drifted, 0.0)
@@ -114,7 +118,7 @@ def confirm_friction(
         state.back = min(state.back + TAKE * min(missing / width, 1.0) * dt, 1.0)
     else:
         state.back = max(state.back - (GIVE_FAST if coming > OVER else GIVE) * dt, 0.0)
-    if state.back == 0.0 and share > CONFIRMS:
+    if state.back == 0.0 and state.excess == 0.0 and share > CONFIRMS:
         if state.friction[0] == 0.0:
             state.usual = accel_offset  # of the road that the first braking was on
         for i in range(4):
@@ -130,3 +134,12 @@ def confirmed_friction(state: Record, mu: float, corner: int, base: float) -> fl
         return mu - min(state.back, 1.0) * max(mu - base, 0.0)
     most: float = mu - min(state.back, 1.0) * max(mu - confirmed, 0.0)
     return min(most, confirmed * (1.0 - LOWER * (state.back - 1.0))) if state.back > 1.0 else most
+
+
+@kernel
+def least_friction(state: Record, mu: float, used: float, corner: int, base: float, dt: float) -> float:
+    """Return the friction `mu`, fallen from what was confirmed no further than the deceleration allows."""
+    if state.excess == 0.0:
+        return mu
+    reference = state.friction[corner] if state.friction[corner] > 0.0 else base
+    return max(mu, min(used * (1.0 + state.excess * dt / FOLLOW_S), max(reference, used)))

@@ -24,7 +24,11 @@ import math
 import numpy as np
 
 from ecu.algorithm.brake import brake_gain
-from ecu.algorithm.control.confirmed_friction import CONFIRMED_STATE, confirmed_friction
+from ecu.algorithm.control.confirmed_friction import (
+    CONFIRMED_STATE,
+    confirmed_friction,
+    least_friction,
+)
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO, well_observed
 from ecu.contract.params import INVERSE, OFF
 from ecu.jit import Record, kernel
@@ -98,6 +102,7 @@ def follow_friction(params: Record, state: Record, estimate: Record, dt: float) 
         target = _target(params, state, estimate, i)
         if state.cut[i] or state.beyond_grip:
             target = max(target, state.used[i])
+        target = least_friction(confirmed, target, state.used[i], i, base, dt)
         state.used[i] += min(max(target - state.used[i], -step), step)
         confirmed.heading += 0.25 * base / target
         confirmed.in_use += 0.25 * base / state.used[i]

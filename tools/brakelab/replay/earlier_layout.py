@@ -32,6 +32,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "still_s",
         "opposed",
         "shown_at",
+        "excess",
         "noisy",
         "latest",
         "steady_s",
