@@ -76,7 +76,9 @@ def test_the_ranking_of_table_2_1(two_trips: tuple[Trip, Trip], lining: Lining) 
     radius = lining.brake.tyre_radius / lining.brake.effective_radius
     errors = errors_by_manoeuvre(found, second, radius)
     print(errors)
-    whole = {name: np.mean(list(errors[name].values())) for name in (NETWORK, OSTERMEYER, SURFACE)}
+    whole = {
+        name: np.mean([e.nrmse for e in errors[name].values()]) for name in (NETWORK, OSTERMEYER, SURFACE)
+    }
     assert min(whole, key=lambda name: whole[name]) == NETWORK
     wrong = {name: error_by_temperature(found[name], second.stops, 0.6) for name in found}
     right = {name: error_by_temperature(found[name], second.stops, 1.0) for name in found}
@@ -121,3 +123,20 @@ def test_quasi_static_leaves_out_what_changes(stops: Stops) -> None:
     lengths = np.diff(stops.first)
     t = stops.dt * np.concatenate([np.arange(length) for length in lengths])
     assert np.mean(quasi_static(replace(stops, pressure=stops.pressure * np.exp(2.0 * t)))) < 0.1
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_an_error_has_a_mean_part_and_scatter(two_trips: tuple[Trip, Trip], lining: Lining) -> None:
+    """An estimator 0.02 above the truth everywhere errs by that alone; the mean is left with its scatter."""
+    trip = two_trips[0]
+    radius = lining.brake.tyre_radius / lining.brake.effective_radius
+    found = {CONSTANT: lambda stops: np.full(len(stops.mu), 0.4), SURFACE: lambda stops: stops.mu + 0.02}
+    errors = errors_by_manoeuvre(found, trip, radius)
+    kinds = {kind: which for kind, which in manoeuvres(trip.stops, radius).items() if len(which)}
+    assert len(kinds) >= 2
+    for kind, which in kinds.items():
+        mu = trip.stops.mu[np.isin(trip.stops.block_stop, which)]
+        assert list(errors[SURFACE][kind]) == pytest.approx([2.0 / mu.mean()] * 2)
+        assert errors[CONSTANT][kind].mean == pytest.approx(100.0 * (0.4 / mu.mean() - 1.0))
+        scatter = np.hypot(errors[CONSTANT][kind].mean, 100.0 * mu.std() / mu.mean())
+        assert errors[CONSTANT][kind].nrmse == pytest.approx(scatter)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,14 @@ def estimators(stops: Stops, brake: RigBrake, seed: int) -> dict[str, Estimator]
     }
 
 
+class Error(NamedTuple):
+    """An estimator's error over the mean friction [%]."""
+
+    nrmse: float
+    mean: float
+    """Signed; what it leaves of `nrmse` is scatter."""
+
+
 def nrmse(estimate: Vector, mu: Vector) -> float:
     """Return the RMS error over the mean friction [%]."""
     return 100.0 * float(np.sqrt(np.mean((estimate - mu) ** 2)) / mu.mean())
@@ -64,17 +72,23 @@ def nrmse(estimate: Vector, mu: Vector) -> float:
 
 def errors_by_manoeuvre(
     found: dict[str, Estimator], trip: Trip, radius: float
-) -> dict[str, dict[str, float]]:
-    """Return the nRMSE [%] by estimator (with * on the lumped temperature) and manoeuvre A to D."""
+) -> dict[str, dict[str, Error]]:
+    """Return the errors by estimator (with * on the lumped temperature) and manoeuvre A to D."""
     kinds = manoeuvres(trip.stops, radius)
-    table: dict[str, dict[str, float]] = {}
+    table: dict[str, dict[str, Error]] = {}
     for name, estimator in found.items():
         for mark, stops in (("", trip.stops), ("*", trip.lumped)):
             if mark and name not in (OSTERMEYER, NETWORK):
                 continue
             estimate = estimator(stops)
             within = {kind: np.isin(stops.block_stop, which) for kind, which in kinds.items()}
-            table[name + mark] = {kind: nrmse(estimate[b], stops.mu[b]) for kind, b in within.items()}
+            table[name + mark] = {
+                kind: Error(
+                    nrmse(estimate[b], stops.mu[b]),
+                    100.0 * float((estimate[b] - stops.mu[b]).mean() / stops.mu[b].mean()),
+                )
+                for kind, b in within.items()
+            }
     return table
 
 

@@ -4,12 +4,14 @@ from typing import Final
 
 import numpy as np
 
+from brakelab.arrays import Vector
+from brakelab.identify.friction.estimators import OSTERMEYER
 from brakelab.results.text_table import Table
 from brakelab.results.verdict import Goal, verdict
 from brakelab.studies.lab.goals import OBSERVER_GOAL, as_drawn, same_ranking
 from brakelab.studies.lab.observer import CAUSES, KINDS
 from brakelab.studies.lab.run import Lab
-from brakelab.studies.lab.trips import FACTORS
+from brakelab.studies.lab.trips import FACTORS, PADS, median_wrong, over_pads
 
 TABLE_2_1: Final = {
     "response surface": (28.14, 17.74, 18.35, 12.27),
@@ -22,39 +24,60 @@ TABLE_2_1: Final = {
 
 def estimator_tables(lab: Lab) -> list[Table]:
     """Return the tables of chapter 2."""
-    return [_estimators(lab), _limits(lab), _temperature(lab)]
+    return [_estimators(lab), _mean_errors(lab), _limits(lab), _temperature(lab)]
 
 
 def _estimators(lab: Lab) -> Table:
     rows, cars = [], as_drawn(lab)
-    for name, errors in lab.on_trips.errors.items():
+    for name, errors in over_pads(lab.on_trips).items():
         printed = TABLE_2_1.get(name)
         cells = []
-        for place, kind in enumerate("ABCD"):
-            cells += [f"{printed[place]:.1f}" if printed else "–", f"{errors[kind]:.1f}"]
+        for place, kind in enumerate(KINDS):
+            cells += [f"{printed[place]:.1f}" if printed else "–", _spread(errors[kind])]
         rows.append((name, *cells))
     observer = {kind: [car.adapted[kind] for car in cars] for kind in KINDS}
     cells = []
     for kind in KINDS:
-        cells += ["–", f"{np.median(observer[kind]):.1f} (to {max(observer[kind]):.1f})"]
+        cells += ["–", _spread(observer[kind])]
     rows.append(("joint observer, in cars", *cells))
     cold = ", ".join(f"{np.median([car.cold[kind] for car in cars]):.1f}" for kind in KINDS)
     constant = ", ".join(f"{np.median([car.nominal[kind] for car in cars]):.0f}" for kind in KINDS)
     goal = verdict(*(Goal(kind, float(np.median(observer[kind])), OBSERVER_GOAL) for kind in KINDS))
     below = (
-        "nRMSE [%], brake A, identified on trip 1 and judged on trip 2 of the same pad; *: temperature of "
+        f"nRMSE [%], median (worst) of {len(PADS)} pads, as many of each brake, each identified on trip 1 "
+        "and judged on trip 2; *: temperature of "
         "a lumped model with constants 5 % off. A mild from low speed, B mild from high, C gentle from "
         "low, D gentle from high: all brake applications of a kind, where the thesis shows one of each. The "
         "order of "
-        f"the three is the thesis's in {', '.join(same_ranking(lab.on_trips.errors)) or 'none'}. True "
+        "the three is the thesis's on "
+        f"{', '.join(f'{count} in {kind}' for kind, count in same_ranking(lab.on_trips).items())}. True "
         "friction is measured here; the thesis has an observer's estimate. Static LuGre knows speed alone."
         "\n\nThe joint observer: "
         f"front axle of {len(cars)} cars of the wide draw, which no dynamometer has seen, after ten "
         "minutes of ordinary driving; median (worst car). Nothing learned before: "
         f"{cold} %; the configured constant {constant} %. Goal: {OBSERVER_GOAL:.0f} %; {goal}."
     )
-    columns = ("estimator", *(f"{kind}{what}" for kind in "ABCD" for what in (", thesis", "")))
+    columns = ("estimator", *(f"{kind}{what}" for kind in KINDS for what in (", thesis", "")))
     return Table("Table 2.1: estimators on a trip", columns, rows, below)
+
+
+def _spread(errors: Vector | list[float]) -> str:
+    return f"{np.median(errors):.1f} (to {max(errors):.1f})"
+
+
+def _mean_errors(lab: Lab) -> Table:
+    """Return what of Ostermeyer's error is no scatter, with the right and with the lumped temperature."""
+    rows = []
+    for pad, (brake, seed) in zip(lab.on_trips, PADS, strict=True):
+        cells = [f"{pad.errors[n][kind].mean:+.1f}" for kind in KINDS for n in (OSTERMEYER, f"{OSTERMEYER}*")]
+        rows.append((f"{brake}, pad {seed}", *cells))
+    columns = ("pad", *(f"{kind}{mark}" for kind in KINDS for mark in ("", "*")))
+    below = (
+        "Mean error [%] of the applications of a kind. Where the lumped temperature (*) is the better one, "
+        "its error takes away from a mean error that the law has with the right one: it knows temperature "
+        "alone, so what speed and pressure do to the friction of a kind is left."
+    )
+    return Table("Table 2.1: mean error of Ostermeyer's law", columns, rows, below)
 
 
 def _limits(lab: Lab) -> Table:
@@ -62,7 +85,7 @@ def _limits(lab: Lab) -> Table:
     for cause in CAUSES:
         of = [car.adapted for car in lab.in_cars if car.cause == cause]
         errors = {kind: np.array([car[kind] for car in of]) for kind in KINDS}
-        rows.append((cause, *(f"{np.median(errors[k]):.1f} (to {errors[k].max():.1f})" for k in KINDS)))
+        rows.append((cause, *(_spread(errors[k]) for k in KINDS)))
     below = (
         "nRMSE [%] of the front axle, adapted, median (worst car) of the same cars, what a row names "
         "as their configuration has it. Why: see Causes."
@@ -71,12 +94,14 @@ def _limits(lab: Lab) -> Table:
 
 
 def _temperature(lab: Lab) -> Table:
-    rows = [(name, *(f"{error:.1f}" for error in errors)) for name, errors in lab.on_trips.wrong.items()]
-    lost = {name: max(errors) - min(errors) for name, errors in lab.on_trips.wrong.items()}
+    wrong = median_wrong(lab.on_trips)
+    rows = [(name, *(f"{error:.1f}" for error in errors)) for name, errors in wrong.items()]
+    lost = {name: float(np.ptp(errors)) for name, errors in wrong.items()}
     order = sorted(lost, key=lambda name: -lost[name])
     below = (
-        "nRMSE [%] over trip 2 when the temperature is wrong by this factor. Figure 2.9 has no numbers; it "
-        "says that the network is the most sensitive and Ostermeyer robust. Most is lost here by "
+        "nRMSE [%] over trip 2, median of the pads, when the temperature is wrong by this factor. Figure "
+        "2.9 has no numbers; it says that the network is the most sensitive and Ostermeyer robust. Most is "
+        "lost here by "
         f"{', then '.join(f'{name} ({lost[name]:.0f})' for name in order[:2])}; the others do not know the "
         "temperature. Settled, Ostermeyer's law is proportional to the kelvin temperature."
     )

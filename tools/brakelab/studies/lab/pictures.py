@@ -16,7 +16,7 @@ from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line,
 from brakelab.studies.lab.brakes import Brake
 from brakelab.studies.lab.run import Lab
 from brakelab.studies.lab.searches import Searches
-from brakelab.studies.lab.trips import FACTORS, OnTrips
+from brakelab.studies.lab.trips import FACTORS, OnTrips, median_wrong
 from brakelab.studies.physics.heat import BRAKES
 
 NAMES: Final = ("speed", "pressure", "temperature", "friction")
@@ -184,8 +184,9 @@ def _cost(name: str, cost: Cost) -> Panel:
     return Panel(title, label, (x[0], x[-1]), (y[0], y[-1]), lines, cells=cells)
 
 
-def estimators(found: OnTrips) -> list[Panel]:
-    """Return Figures 2.8 (friction above, temperature below), 2.6, 2.7 and 2.9."""
+def estimators(pads: list[OnTrips]) -> list[Panel]:
+    """Return Figures 2.8 (friction above, temperature below), 2.6, 2.7 of the first pad, and 2.9 of all."""
+    found = pads[0]
     above, below = [], []
     for kind, trace in found.traces.items():
         ends = (0.0, float(trace.t[-1]))
@@ -207,7 +208,8 @@ def estimators(found: OnTrips) -> list[Panel]:
         label = f"sliding speed [m/s], at {each.temperature:.0f} °C"
         maps.append(Panel(title, label, (0.0, float(each.speed[-1])), (0.0, float(y[-1])), [], cells=cells))
     x = np.array(FACTORS)
-    wrong = [Line(x, np.array(found.wrong[name]), colour) for name, colour in OF_ESTIMATOR.items()]
+    errors = median_wrong(pads)
+    wrong = [Line(x, errors[name], colour) for name, colour in OF_ESTIMATOR.items()]
     top = 1.1 * max(float(line.y.max()) for line in wrong)
     last = Panel("2.9: nRMSE [%]", "temperature shown over true", (x[0], x[-1]), (0.0, top), wrong)
     return [*above, *below, *maps, last]

@@ -10,7 +10,7 @@ from brakelab.studies.lab.choice import Choice, choices
 from brakelab.studies.lab.discovery import Draw, PadTerms, discovered, jobs, pad_terms
 from brakelab.studies.lab.observer import CARS, CAUSES, OnTrip, on_trip
 from brakelab.studies.lab.searches import Searches, searches
-from brakelab.studies.lab.trips import OnTrips, trips
+from brakelab.studies.lab.trips import PADS, OnTrips, trips
 from brakelab.studies.physics.heat import BRAKES
 
 
@@ -19,7 +19,7 @@ class Lab(NamedTuple):
 
     brakes: dict[str, Brake]
     recovered: list[Recovered]
-    on_trips: OnTrips
+    on_trips: list[OnTrips]  # of `PADS`
     in_cars: list[OnTrip]  # the joint observer
     draws: list[Draw]  # of discovery
     pads: list[PadTerms]
@@ -34,7 +34,9 @@ def run_lab(progress: Callable[[str], None]) -> Lab:
         brakes[brake] = measure(brake, progress)
         progress(f"{brake}: CPC simulated and all laws identified in {brakes[brake].seconds:.0f} s")
     with new_pool(2) as pool:
-        on_road, searched = pool.submit(trips), pool.submit(searches)
+        searched = pool.submit(searches)
+        on_trips = list(pool.map(trips, PADS))
+        progress(f"estimators of chapter 2: {len(on_trips)} pads")
         sets = [*product(("R1",), BRAKES, range(DRAWS)), *product(("R2",), BRAKES, range(R2_DRAWS))]
         found = list(pool.map(recovered, sets))
         progress(f"recovery: {len(found)} draws")
@@ -43,5 +45,5 @@ def run_lab(progress: Callable[[str], None]) -> Lab:
         draws = list(pool.map(discovered, jobs()))
         progress(f"discovery: {len(draws)} draws")
         pads = list(pool.map(pad_terms, BRAKES))
-        on_trips, costs = on_road.result(), searched.result()
+        costs = searched.result()
     return Lab(brakes, found, on_trips, in_cars, draws, pads, costs, choices(progress))

@@ -104,7 +104,7 @@ by slopes (dashed).
 
 ![Manoeuvres A to D, response surface, network, sensitivity to temperature](images/lab-estimators.svg)
 
-Figures 2.6 to 2.9. In 2.6 and 2.7 only cells are drawn that the trip had; the thesis draws its surface and
+Figures 2.6 to 2.9, of pad A; 2.9 of all pads. In 2.6 and 2.7 only cells are drawn that the trip had; the thesis draws its surface and
 network over all of the plane. 2.8, the longest braking of each kind: nobody follows the first second of A,
 where plateaus grow that no input shows; in B Ostermeyer's law goes on rising with the disc where friction
 no longer does; C and D scatter by the torque sensor, which has little to measure. The thesis shows the

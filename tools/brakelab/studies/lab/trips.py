@@ -1,5 +1,6 @@
-"""The estimators of section 2.4 on a pad's second trip: Table 2.1 and the data of Figures 2.6 to 2.9."""
+"""The estimators of section 2.4 on each pad's second trip: Table 2.1 and the data of Figures 2.6 to 2.9."""
 
+from itertools import product
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from brakelab.identify.friction.dynamometer import new_bench
 from brakelab.identify.friction.estimators import (
     NETWORK,
     SURFACE,
+    Error,
     Estimator,
     error_by_temperature,
     errors_by_manoeuvre,
@@ -16,8 +18,11 @@ from brakelab.identify.friction.estimators import (
 )
 from brakelab.identify.friction.stops import Stops, block_inputs
 from brakelab.identify.friction.trips import Trip, drive, manoeuvres
-from brakelab.studies.lab.brakes import SEED, columns_of, linings
+from brakelab.studies.lab.brakes import columns_of, linings
+from brakelab.studies.physics.heat import BRAKES
 
+PADS: Final = tuple(product(BRAKES, range(1, 6)))
+"""Brake and seed of the pads; Figures 2.6 to 2.8 are drawn of the first."""
 FACTORS: Final = (0.6, 0.8, 1.0, 1.2, 1.4)  # of a wrong temperature
 CELLS: Final = 20  # of a map, along each axis
 CLOSE: Final = 30.0  # K, about the temperature of a map
@@ -44,21 +49,22 @@ class Trace(NamedTuple):
 
 
 class OnTrips(NamedTuple):
-    """All of the second trip."""
+    """All of a pad's second trip."""
 
-    errors: dict[str, dict[str, float]]  # nRMSE [%] by estimator and manoeuvre
+    errors: dict[str, dict[str, Error]]  # by estimator and manoeuvre
     wrong: dict[str, list[float]]  # nRMSE [%] by estimator, at FACTORS
     maps: dict[str, Map]
     traces: dict[str, Trace]  # by manoeuvre
 
 
-def trips() -> OnTrips:
-    """Return the estimators' errors and their traces."""
-    lining = linings().lining["A"]
+def trips(pad: tuple[str, int]) -> OnTrips:
+    """Return the estimators' errors and their traces on one of `PADS`."""
+    brake, seed = pad
+    lining = linings().lining[brake]
     columns = columns_of(lining)
-    bench = new_bench(lining, "A", SEED)
+    bench = new_bench(lining, brake, seed)
     first, second = drive(bench, columns, 1), drive(bench, columns, 2)
-    found = estimators(first.stops, lining.brake, SEED)
+    found = estimators(first.stops, lining.brake, seed)
     radius = lining.brake.tyre_radius / lining.brake.effective_radius
     wrong = {
         name: [error_by_temperature(estimator, second.stops, factor) for factor in FACTORS]
@@ -67,6 +73,19 @@ def trips() -> OnTrips:
     maps = {name: map_of(found[name], first.stops) for name in (SURFACE, NETWORK)}
     errors = errors_by_manoeuvre(found, second, radius)
     return OnTrips(errors, wrong, maps, traces(found, second, radius))
+
+
+def over_pads(found: list[OnTrips]) -> dict[str, dict[str, Vector]]:
+    """Return the nRMSE [%] by estimator and manoeuvre, shape (pads,) each."""
+    return {
+        name: {kind: np.array([pad.errors[name][kind].nrmse for pad in found]) for kind in errors}
+        for name, errors in found[0].errors.items()
+    }
+
+
+def median_wrong(found: list[OnTrips]) -> dict[str, Vector]:
+    """Return the median nRMSE [%] of the pads by estimator, at `FACTORS`."""
+    return {name: np.median([pad.wrong[name] for pad in found], axis=0) for name in found[0].wrong}
 
 
 def map_of(estimator: Estimator, stops: Stops) -> Map:
