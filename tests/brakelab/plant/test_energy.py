@@ -180,3 +180,14 @@ def test_what_a_bounce_had_the_dampers_take(shipped: Maker) -> None:
     found = energy(car.params, start, car.state)
     assert found.dampers == pytest.approx(0.5 * (MASS - 188.0) * 0.25, rel=1e-3)
     assert abs(found.missing) < 1e-3
+
+
+@pytest.mark.parametrize("manoeuvre", ["regenerating", "driving off", "braking"])
+def test_the_battery_gets_what_the_motors_leave(shipped: Maker, manoeuvre: str) -> None:
+    car, seen, booked = drive(shipped, "suv14", manoeuvre)
+    torque, spin = (np.asarray(seen[name][1:]) for name in ("motor_torque", "wheel_speed"))
+    loss = np.where(np.abs(torque) < 1.0, 0.0, 1.2e-3 * torque**2 + 10.0 * np.abs(spin))
+    lost = 1e-3 * float(np.sum(loss))
+    given = booked.regenerated - booked.driven
+    assert float(car.now["charged"] - car.now["discharged"]) == pytest.approx(given - lost, rel=1e-3, abs=1.0)
+    assert (lost > 0.0) == (manoeuvre != "braking")

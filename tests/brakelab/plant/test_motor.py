@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakelab.plant.motor import advance_motors
+from brakelab.plant.motor import advance_motors, motor_loss
 from brakelab.plant.records import HISTORY
 
 NOMINAL, PEAK, NOMINAL_POWER, PEAK_POWER = 1350.0, 2000.0, 42e3, 100e3
@@ -65,3 +65,25 @@ def test_without_a_peak_the_nominal_limits_hold_from_the_start(shipped: Maker) -
     car = shipped("suv", 10.0)
     car.state["wheel_speed"] = 20.0
     assert ask(car, -9000.0, 0.1)[-1] == pytest.approx(-NOMINAL)
+
+
+@pytest.mark.parametrize(
+    ("torque", "speed", "efficiency"),
+    [
+        pytest.param(1350.0, 31.1, 0.94, id="nominal"),
+        pytest.param(-1350.0, 31.1, 0.94, id="driving"),
+        pytest.param(1350.0, 5.0, 0.67, id="slow, hard: copper"),
+        pytest.param(30.0, 100.0, 0.66, id="fast, light: iron and gear"),
+        pytest.param(300.0, 60.0, 0.96, id="between"),
+    ],
+)
+def test_a_motor_loses_most_at_the_ends_of_its_map(
+    shipped: Maker, torque: float, speed: float, efficiency: float
+) -> None:
+    car = shipped("suv14", 10.0)
+    power = abs(torque * speed)
+    assert 1.0 - motor_loss(car.params[0], torque, speed) / power == pytest.approx(efficiency, abs=0.01)
+
+
+def test_without_current_nothing_is_lost(shipped: Maker) -> None:
+    assert motor_loss(shipped("suv14", 10.0).params[0], 0.5, 100.0) == 0.0

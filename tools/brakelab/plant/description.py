@@ -143,6 +143,8 @@ class Motor(Section):
     charge_limit: NotNegative = np.inf  # W, of the battery
     discharge_limit: NotNegative = np.inf
     fade_speed: Positive
+    copper_loss: NotNegative = 0.0  # W/(N m)^2
+    turning_loss: NotNegative = 0.0  # W s/rad
     share_front: Share
 
     @model_validator(mode="after")
@@ -323,6 +325,7 @@ def nominal(plant: Plant) -> RecordArray:
     car["motor_peak_time"] = motor.peak_time
     car["charge_limit"], car["discharge_limit"] = motor.charge_limit, motor.discharge_limit
     car["motor_fade_speed"] = motor.fade_speed
+    car["motor_copper_loss"], car["motor_turning_loss"] = motor.copper_loss, motor.turning_loss
     if plant.vehicle.engine is not None:
         _set_engine(car, plant.vehicle.engine)
     car["sensor_position"] = plant.vehicle.sensor.position

@@ -4,7 +4,11 @@ Torque is that at the wheel, positive when it brakes (regenerates). The map has 
 torque, then constant power; below a wheel speed regeneration fades out. Above the nominal limits lies a peak
 that the motor sustains for a time (30 s, Table A.1): use of the peak empties a reserve, which refills
 otherwise, and the last second of the reserve fades the peak out. The battery's limits are shared equally by
-the motors.
+the motors. Between wheel and battery copper, iron, gear and inverter take their part:
+
+    P_battery = T w - copper T^2 - turning |w|
+
+The motors are switched reluctance (A.2.2), which without current have no field and lose nothing.
 """
 
 import math
@@ -17,12 +21,22 @@ TIME_CONSTANT: Final = 0.0022  # s (A.16)
 DEAD_TIME: Final = 0.0022  # s (A.16)
 RECOVERY: Final = 1.0 / 3.0  # s of peak regained per second at or below the nominal torque. Assumption
 PEAK_FADE: Final = 1.0  # s of reserve. Assumption
+EXCITED: Final = 1.0  # N m at the wheel, from which on a motor has current
 
 
 @kernel
 def map_torque(torque_limit: float, power_limit: float, speed: float) -> float:
     """Return the torque [N m] of a map with these limits [N m, W] at a wheel speed >= 0 [rad/s]."""
     return min(torque_limit, power_limit / max(speed, 1.0))
+
+
+@kernel
+def motor_loss(params: Record, torque: float, speed: float) -> float:
+    """Return the power [W] lost in a motor, its inverter and gear; `torque` and `speed` of the wheel."""
+    if abs(torque) < EXCITED:
+        return 0.0
+    loss: float = params.motor_copper_loss * torque * torque + params.motor_turning_loss * abs(speed)
+    return loss
 
 
 @kernel

@@ -85,6 +85,8 @@ PARAMS: Final = np.dtype(
         ("charge_limit", "f8"),  # W, of the battery
         ("discharge_limit", "f8"),  # W
         ("motor_fade_speed", "f8"),  # rad/s of the wheel: below it regeneration fades out
+        ("motor_copper_loss", "f8"),  # W/(N m)^2, torque at the wheel
+        ("motor_turning_loss", "f8"),  # W s/rad of the wheel
         # of the car with a combustion engine, see engine.py
         ("engine_drag_torque", "f8"),  # N m at the crankshaft
         ("engine_drag_growth", "f8"),  # N m per rad/s
@@ -172,6 +174,8 @@ STATE: Final = np.dtype(
         ("damper_heat", "f8"),
         ("regenerated", "f8"),  # into the motors
         ("driven", "f8"),  # out of the motors
+        ("charged", "f8"),  # into the battery, by motors that gave more than they lost
+        ("discharged", "f8"),  # out of the battery
         ("engine_loss", "f8"),  # into an engine in overrun
         ("lifted", "f8"),  # against gravity
         ("road_work", "f8"),  # of the road's heights on the tyres

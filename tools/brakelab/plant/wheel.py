@@ -12,6 +12,7 @@ turn it back. Work of a step is torque times mean spin, exactly the change of th
 import math
 
 from brakelab.plant.jit import Record, kernel
+from brakelab.plant.motor import motor_loss
 from brakelab.plant.tyre import (
     TRANSITION_SPEED,
     degressive,
@@ -65,6 +66,10 @@ def advance_wheel(
         state.regenerated += regenerated
     else:
         state.driven -= regenerated
+    if params.motor_share[wheel] > 0.0:
+        charged = regenerated - dt * motor_loss(params, state.motor_torque[wheel], turned / dt)
+        state.charged += max(charged, 0.0)
+        state.discharged -= min(charged, 0.0)
     state.tyre_work += 0.5 * radius * (state.force_x[wheel] + new_force) * turned
 
     state.rolling_radius[wheel] = radius

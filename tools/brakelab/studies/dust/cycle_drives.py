@@ -39,6 +39,7 @@ class CycleDrive(NamedTuple):
     work: Array
     """J of the friction brakes."""
     regenerated: float
+    charged: float
     """J"""
     hottest: Array
     """degC"""
@@ -125,7 +126,7 @@ def drive_cycle(car: Shipped, models: tuple[Dust, Dust], cycle: str, minimise: s
     config = configured(car.config, models, minimise)
     blending = config.blending.front + config.blending.rear > 0.0
     sums, last = _Sums(), None
-    distance, regenerated = 0.0, 0.0
+    distance, regenerated, charged = 0.0, 0.0, 0.0
     particles, worn, work = np.zeros(4), np.zeros(4), np.zeros(4)
     for scenario in _scenarios(car.plant, cycle, blending):
         loop = new_loop(scenario, config, seed)
@@ -143,7 +144,8 @@ def drive_cycle(car: Shipped, models: tuple[Dust, Dust], cycle: str, minimise: s
             sums.add(block.truth, block.outputs, np.interp(CYCLE * np.arange(begin, end), *trace.T))
             outputs, begin = block.outputs[-1], end
         distance += float(state["distance"])
-        regenerated += float(np.sum(state["regenerated"]))
+        regenerated += float(state["regenerated"])
+        charged += float(state["charged"])
         particles += state["particles"]
         worn += state["pad_wear_mass"] - worn_before
         work += state["brake_heat"] - work_before
@@ -157,6 +159,7 @@ def drive_cycle(car: Shipped, models: tuple[Dust, Dust], cycle: str, minimise: s
         worn,
         work,
         regenerated,
+        charged,
         sums.hottest,
         sums.rear_ahead,
         (_high(slips[:, :2]), _high(slips[:, 2:])),

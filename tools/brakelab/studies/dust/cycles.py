@@ -144,6 +144,7 @@ def saving_rows(cars: list[Driven]) -> list[tuple[str, ...]]:
                         f"{drive.hottest[:2].max():.0f}, {drive.hottest[2:].max():.0f}",
                         f"{1e-6 * drive.work.sum():.2f}",
                         f"{1e-6 * drive.regenerated:.2f}",
+                        f"{1e-6 * drive.charged:.2f}",
                         f"{100 * drive.greatest_slip[0]:.1f}, {100 * drive.greatest_slip[1]:.1f}",
                         f"{drive.rear_ahead:+.3f}",
                         f"{drive.guarded:.2f}",
@@ -245,7 +246,8 @@ def _run(asked: Asked) -> Measured:
         Table(
             "What braking against dust saves and costs",
             ("car", "cycle", "minimise", "particles saved [%]", "mass saved [%]", "front's share of the work",
-             "hottest front, rear [degC]", "brakes [MJ]", "regenerated [MJ]", "slip front, rear [%]",
+             "hottest front, rear [degC]", "brakes [MJ]", "regenerated [MJ]", "into the battery [MJ]",
+             "slip front, rear [%]",
              "rear ahead", "slip guard [s]", "speed error [m/s]", "goal"),
             saving_rows(cars),
             f"Closed loop, drawn car {CAR}. Goal: {GOAL:.0f} % of particles in real driving without "

@@ -104,12 +104,13 @@ by slopes (dashed).
 
 ![Manoeuvres A to D, response surface, network, sensitivity to temperature](images/lab-estimators.svg)
 
-Figures 2.6 to 2.9, of pad A; 2.9 of all pads. In 2.6 and 2.7 only cells are drawn that the trip had; the thesis draws its surface and
-network over all of the plane. 2.8, the longest braking of each kind: nobody follows the first second of A,
-where plateaus grow that no input shows; in B Ostermeyer's law goes on rising with the disc where friction
-no longer does; C and D scatter by the torque sensor, which has little to measure. The thesis shows the
-network ahead in all four and Ostermeyer's law worst in A, as here. The lumped temperature (pink) runs off by
-30 K: nominal friction, constants 5 % off, and a heat capacity that does not rise. 2.9 is discussed below.
+Figures 2.6 to 2.9, a pad of brake A; 2.9 of all pads. In 2.6 and 2.7 only cells are drawn that the trip
+had; the thesis draws its surface and network over all of the plane. 2.8, the longest braking of each kind:
+nobody follows the first second of A, where plateaus grow that no input shows; in B Ostermeyer's law goes on
+rising with the disc where friction no longer does; C and D scatter by the torque sensor, which has little
+to measure. The thesis shows the network ahead in all four and Ostermeyer's law worst in A, as here. The
+lumped temperature (pink) runs off by 30 K: nominal friction, constants 5 % off, and a heat capacity that
+does not rise. 2.9 is discussed below.
 """
 
 
