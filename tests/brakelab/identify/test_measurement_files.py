@@ -8,7 +8,7 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.identify.measurement_files import open_campaign, read_columns, read_manifest
+from brakelab.identify.measurement_files import open_campaign, read_columns
 from ecu.errors import UserError
 from ecu.settings.resources import resource
 
@@ -27,37 +27,6 @@ TABLE = pa.table({"t": [0.0, 0.1], "omega": [80.0, 79.0]})
 def test_the_ending_of_a_block_may_be_in_capitals(tmp_path: Path, name: str, write) -> None:
     write(TABLE, tmp_path / name)
     assert read_columns(tmp_path / name, ("t", "omega"), "block")["omega"].tolist() == [80.0, 79.0]
-
-
-MANIFEST = "block,file,mass_before\nkühl,b1.csv,905.123\n"
-EXPORTS = {
-    "Excel, CSV UTF-8": MANIFEST.encode("utf-8-sig"),
-    "Excel, German": MANIFEST.replace(",", ";").replace(".123", ",123").encode("cp1252"),
-    "Excel, Unicode text": MANIFEST.replace(",", "\t").encode("utf-16"),
-    "LibreOffice": MANIFEST.encode(),
-    "units in brackets": MANIFEST.replace("mass_before", "mass_before [kg]")
-    .replace("905.", "0.905")
-    .encode(),
-    "a row of units, an empty one": (
-        MANIFEST.replace("\nk", "\n-,,mg\nk").replace("905.123", "905123") + ",,\n"
-    ).encode(),
-    "Excel's first line": b"sep=,\n" + MANIFEST.encode(),
-}
-
-
-@pytest.mark.parametrize("text", EXPORTS.values(), ids=EXPORTS)
-def test_a_manifest_is_what_a_spreadsheet_writes(tmp_path: Path, text: bytes) -> None:
-    (tmp_path / "manifest.csv").write_bytes(text)
-    row = {"block": "kühl", "file": "b1.csv", "mass_before": "905.123"}
-    ((line, found),) = read_manifest(tmp_path / "manifest.csv")
-    assert found == row
-    assert text.splitlines()[line - 1].find(b"b1.csv") > 0 or text[:2] == b"\xff\xfe"
-
-
-def test_a_unit_that_is_not_known_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "manifest.csv").write_text(MANIFEST.replace("mass_before", "mass_before (oz)"))
-    with pytest.raises(UserError, match=r"mass_before: unit 'oz' unknown; give it in g"):
-        read_manifest(tmp_path / "manifest.csv")
 
 
 BLOCKS = {
@@ -145,9 +114,3 @@ def test_a_measurement_counts_once(tmp_path: Path, rows: tuple[str, ...], line: 
         UserError, match=f"manifest.csv: {line}: the same measurement as line 2; leave one of them out"
     ):
         open_campaign(manifest, resource("config/suv.toml"), "front", tmp_path / "out.toml")
-
-
-def test_a_measured_file_in_the_manifests_place_is_refused_in_one_line(tmp_path: Path) -> None:
-    (tmp_path / "block.parquet").write_bytes(b"PAR1\x00\r\x00\n")
-    with pytest.raises(UserError, match=r"block\.parquet: is no text; save it as CSV"):
-        read_manifest(tmp_path / "block.parquet")

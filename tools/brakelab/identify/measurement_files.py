@@ -1,11 +1,8 @@
-"""Manifests and tables of measurements: read, and refused with one line if invalid."""
+"""Tables of measurements: read, and refused with one line if invalid."""
 
-import codecs
-import csv
 import datetime
 import re
 from collections.abc import Sequence
-from itertools import zip_longest
 from pathlib import Path
 from typing import Final
 
@@ -14,9 +11,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from brakelab.arrays import Array
+from brakelab.identify.manifest import NAMES, read_manifest
 from brakelab.identify.samples import BEYOND, PEAKS, alone, continued
 from brakelab.identify.units import COUNTED, UNITS, ZEROS
-from brakelab.logs.csv_header import find_header, split_title
+from brakelab.logs.csv_header import find_header
 from brakelab.logs.csv_rows import csv_columns, csv_rows
 from brakelab.logs.log_quality import Damage
 from brakelab.replay.log import log_hash
@@ -41,91 +39,11 @@ CONTRACT: Final = {
     "tunnel_flow": ("flow", "m^3/s"),
 }
 """Quantity and unit of the columns of blocks and trips."""
-NAMES: Final = ("file", "block", "trip", "test", "programme", "road_energy")
-"""Columns of a manifest that measure nothing."""
-UTF16: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-_DECIMAL: Final = re.compile(r"^([-+]?\d+),(\d+)$")
-_SEPARATOR: Final = re.compile(r'"?sep=.?"?', re.IGNORECASE)
-"""First line of a CSV file that Excel wrote for itself."""
-_WEIGHED: Final = {
-    "g": ("g", 1.0), "kg": ("g", 1e3), "mg": ("g", 1e-3), "mm": ("mm", 1.0), "µm": ("mm", 1e-3),
-    "μm": ("mm", 1e-3), "um": ("mm", 1e-3), "MJ": ("MJ", 1.0),
-}  # fmt: skip
-"""Units of a manifest: of what, and factor."""
-_NOTHING: Final = ("-", "–", "n/a", "na", "nan")
 _DATE: Final = re.compile(
     r"(?:(\d{1,4})[-./](\d{1,2})[-./](\d{1,4})[T ]+)?(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d*)?)"
 )
 _EPOCH: Final = datetime.date(2000, 1, 1).toordinal()
 """Seconds are counted from here: of today's dates a microsecond is left."""
-
-
-def read_manifest(path: Path) -> list[tuple[int, dict[str, str]]]:
-    """Return the rows of a CSV manifest, each with its line in the file; decimal commas are points.
-
-    Units in brackets behind the names or in a row below them are converted to g, mm and mg; rows without a
-    word count for nothing.
-
-    Raises:
-        UserError: it cannot be read, or has another unit.
-    """
-    try:
-        given = path.read_bytes()
-    except OSError as error:
-        raise UserError(str(path), "", f"cannot be read ({error.strerror}); give a CSV manifest") from None
-    if given[:2] not in UTF16 and b"\0" in given:
-        raise UserError(str(path), "", "is no text; save it as CSV: a table that names the measured files")
-    lines = _decoded(given).splitlines(keepends=True)
-    skipped = 1 if lines and _SEPARATOR.fullmatch(lines[0].strip()) else 0
-    delimiter = max(",;\t", key="".join(lines[skipped : skipped + 1]).count)
-    table = csv.reader(lines[skipped:], delimiter=delimiter)
-    columns = [split_title(title) for title in next(table, [])]
-    rows = [(table.line_num + skipped, [cell.strip() for cell in row]) for row in table if any(row)]
-    units = [unit for _, unit in columns]
-    if rows and _is_units(rows[0][1]):
-        units = [
-            under or unit for unit, under in zip_longest(units, rows.pop(0)[1][: len(units)], fillvalue="")
-        ]
-    factors = [_factor(path, name, unit) for (name, _), unit in zip(columns, units, strict=True)]
-    known = list(zip((name for name, _ in columns), factors, strict=True))
-    return [
-        (line, {name: _cell(text, by) for (name, by), text in zip(known, row, strict=False) if name})
-        for line, row in rows
-    ]
-
-
-def _is_units(row: list[str]) -> bool:
-    known = [cell.strip("[]()") for cell in row if cell and cell != "-"]
-    return bool(known) and all(cell in _WEIGHED for cell in known)
-
-
-def _factor(path: Path, name: str, unit: str) -> float:
-    """Return the factor to g, mm or mg from the unit that a manifest states of a column."""
-    unit = unit.strip("[]()")
-    own = "mm" if "thickness" in name else "mg" if "filter" in name else "g" if "mass" in name else ""
-    if not own or unit in ("", "-", own):
-        return 1.0
-    if unit not in _WEIGHED or (own == "mm") != (_WEIGHED[unit][0] == "mm"):
-        raise UserError(str(path), name, f"unit {unit!r} unknown; give it in {own}")
-    return _WEIGHED[unit][1] / _WEIGHED[own][1]
-
-
-def _cell(text: str, factor: float) -> str:
-    plain = "" if text.lower() in _NOTHING else _DECIMAL.sub(r"\1.\2", text)
-    try:
-        return plain if factor == 1.0 else f"{factor * float(plain):.12g}"
-    except ValueError:
-        return plain
-
-
-def _decoded(given: bytes) -> str:
-    """Return text of whatever a spreadsheet writes: UTF-8 with or without a mark, UTF-16, Windows-1252."""
-    if given[:2] in UTF16:
-        return given.decode("utf-16", "replace")
-    try:
-        return given.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return given.decode("cp1252", "replace")
 
 
 def open_campaign(
@@ -140,7 +58,7 @@ def open_campaign(
         raise UserError("--axle", axle, "choose front or rear")
     vehicle = load_config(config)
     written = out, out.with_suffix(".md"), out.with_suffix(".svg")
-    rows = read_manifest(manifest)
+    rows = read_manifest(manifest, columns)
     files = [manifest.parent / row["file"] for _, row in rows if row.get("file")]
     _refuse_repeated(manifest, rows)
     read = [manifest, *files, *config_files(config), *([columns] if columns else [])]

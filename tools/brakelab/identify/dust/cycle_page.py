@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from brakelab.identify.dust.cycle_run import NEAR_S, NEAR_SPEED, Run, read_run
-from brakelab.identify.measurement_files import read_manifest
+from brakelab.identify.manifest import read_manifest
 from brakelab.results import euro7
 from brakelab.results.outputs import check_outputs, config_files, write_text
 from brakelab.results.text_table import Table, cell, markdown
@@ -125,7 +125,7 @@ def report_cycle(manifest: Path, config: Path, axle: str, out: Path, columns: Pa
     if out.suffix != ".md":
         raise UserError("--out", str(out), "with --cycle a page is written; let it end in .md")
     vehicle = load_config(config)
-    rows = [row for _, row in read_manifest(manifest)]
+    rows = [row for _, row in read_manifest(manifest, columns)]
     files = [manifest.parent / row[name] for row in rows for name in ("file", "reference") if row.get(name)]
     check_outputs(out, (out,), [manifest, *files, *config_files(config), *([columns] if columns else [])])
     run = read_run(manifest, vehicle, axle, columns)

@@ -22,7 +22,8 @@ import numpy as np
 from brakelab.arrays import Array
 from brakelab.identify.dust.features import PERIOD, Recorded, find_applications, find_background
 from brakelab.identify.dust.reader import MOST_COUNT, on_grid, read_trip, trip_columns
-from brakelab.identify.measurement_files import read_columns, read_manifest
+from brakelab.identify.manifest import read_manifest, refuse_row
+from brakelab.identify.measurement_files import read_columns
 from brakelab.simulation.trip.wltp_brake import TRIPS
 from brakelab.stretches import stretches
 from ecu.errors import UserError
@@ -105,13 +106,13 @@ def read_run(manifest: Path, config: Config, axle: str, given: Path | None = Non
     """
     columns = trip_columns(config, axle, given)
     trips, whole = [], dict.fromkeys(WHOLE, math.nan)
-    rows = read_manifest(manifest)
+    rows = read_manifest(manifest, given)
     if not rows:
         raise UserError(str(manifest), "", f"no trips; give a row for each of {len(TRIPS)}")
     for line, row in rows:
         where = f"line {line}"
         if not row.get("trip") or not row.get("file"):
-            raise UserError(str(manifest), where, "needs trip and file")
+            raise refuse_row(manifest, line, row, "trip and file")
         path = manifest.parent / row["file"]
         trip = read_trip(path, row["trip"], False, columns)
         reference = manifest.parent / row["reference"] if row.get("reference") else None

@@ -14,6 +14,7 @@ flow = ["Q_tunnel", "m³/h"]        # likewise
 [rig]                              # inertia, pads, push_out_pressure
 [disc]                             # optional; without, heating is found from the stops
 [uncertainty]                      # optional, see `Uncertainty`
+[manifest]                         # optional: names of a manifest's columns, mass_before = "Masse vorher"
 """
 
 import math
@@ -87,6 +88,7 @@ class Columns(Section):
     rig: Rig = Rig()
     disc: DiscGiven = DiscGiven()
     uncertainty: Uncertainty | None = None
+    manifest: dict[str, str] = Field(default_factory=dict)
 
     @classmethod
     def own(cls, lining: Lining, inertia: float, uncertainty: Uncertainty | None = None) -> Self:

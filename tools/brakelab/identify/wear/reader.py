@@ -19,7 +19,8 @@ from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.reader import read_recording
 from brakelab.identify.friction.recording import Recording
 from brakelab.identify.friction.sequence import read_sequence
-from brakelab.identify.measurement_files import check_celsius, read_columns, read_manifest
+from brakelab.identify.manifest import read_manifest, refuse_row
+from brakelab.identify.measurement_files import check_celsius, read_columns
 from brakelab.identify.samples import bridged
 from brakelab.identify.wear.reproduced import Reproduced, reproduced
 from brakelab.identify.wear.weighings import Lost, read_lost
@@ -63,7 +64,7 @@ def read_blocks(manifest: Path, config: Config, axle: str, columns: Path | None 
     Raises:
         UserError: a file, a row or a value of it is not right.
     """
-    rows = read_manifest(manifest)
+    rows = read_manifest(manifest, columns)
     if not rows:
         raise UserError(str(manifest), "", "no blocks; give a row with block, file, mass_before, mass_after")
     return [_block(manifest, line, row, config, axle, columns) for line, row in rows]
@@ -74,7 +75,7 @@ def _block(
 ) -> Block:
     where = f"line {line}"
     if not row.get("block") or not row.get("file"):
-        raise UserError(str(manifest), where, "needs block, file, mass_before and mass_after")
+        raise refuse_row(manifest, line, row, "block, file, mass_before and mass_after")
     lost = read_lost(manifest, line, row, getattr(config, axle).pad)
     path = manifest.parent / row["file"]
     stops, columns = read_stops(path, Columns.contract(IN_ORDER, "rad/s", config, axle), given)

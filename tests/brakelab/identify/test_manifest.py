@@ -1,0 +1,74 @@
+"""Manifests as spreadsheets write them, with the contract's names or with somebody's own."""
+
+from pathlib import Path
+
+import pytest
+
+from brakelab.identify.manifest import read_manifest
+from ecu.errors import UserError
+
+MANIFEST = "block,file,mass_before\nkühl,b1.csv,905.123\n"
+EXPORTS = {
+    "Excel, CSV UTF-8": MANIFEST.encode("utf-8-sig"),
+    "Excel, German": MANIFEST.replace(",", ";").replace(".123", ",123").encode("cp1252"),
+    "Excel, Unicode text": MANIFEST.replace(",", "\t").encode("utf-16"),
+    "LibreOffice": MANIFEST.encode(),
+    "units in brackets": MANIFEST.replace("mass_before", "mass_before [kg]")
+    .replace("905.", "0.905")
+    .encode(),
+    "a row of units, an empty one": (
+        MANIFEST.replace("\nk", "\n-,,mg\nk").replace("905.123", "905123") + ",,\n"
+    ).encode(),
+    "Excel's first line": b"sep=,\n" + MANIFEST.encode(),
+}
+
+
+@pytest.mark.parametrize("text", EXPORTS.values(), ids=EXPORTS)
+def test_a_manifest_is_what_a_spreadsheet_writes(tmp_path: Path, text: bytes) -> None:
+    (tmp_path / "manifest.csv").write_bytes(text)
+    row = {"block": "kühl", "file": "b1.csv", "mass_before": "905.123"}
+    ((line, found),) = read_manifest(tmp_path / "manifest.csv")
+    assert found == row
+    assert text.splitlines()[line - 1].find(b"b1.csv") > 0 or text[:2] == b"\xff\xfe"
+
+
+def test_a_unit_that_is_not_known_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "manifest.csv").write_text(MANIFEST.replace("mass_before", "mass_before (oz)"))
+    with pytest.raises(UserError, match=r"mass_before: unit 'oz' unknown; give it in g"):
+        read_manifest(tmp_path / "manifest.csv")
+
+
+def test_a_measured_file_in_the_manifests_place_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "block.parquet").write_bytes(b"PAR1\x00\r\x00\n")
+    with pytest.raises(UserError, match=r"block\.parquet: is no text; save it as CSV"):
+        read_manifest(tmp_path / "block.parquet")
+
+
+OWN = "Block;Datei;Masse vorher [kg]\nkühl;b1.csv;0,905123\n"
+NAMED = '[manifest]\nblock = "Block"\nfile = "Datei"\nmass_before = "Masse vorher"\n'
+
+
+@pytest.mark.parametrize("theirs", ["Masse vorher", "Masse vorher [kg]"])
+def test_a_file_of_columns_renames_a_manifest_s_own_columns(tmp_path: Path, theirs: str) -> None:
+    (tmp_path / "manifest.csv").write_text(OWN)
+    (tmp_path / "mine.toml").write_text(NAMED.replace("Masse vorher", theirs))
+    ((_, row),) = read_manifest(tmp_path / "manifest.csv", tmp_path / "mine.toml")
+    assert row == {"block": "kühl", "file": "b1.csv", "mass_before": "905.123"}
+
+
+@pytest.mark.parametrize(
+    ("given", "line"),
+    [
+        (
+            NAMED.replace("vorher", "vorhr"),
+            r"manifest\.csv: Masse vorhr: no such column; this manifest has Block, Datei, Masse vorher",
+        ),
+        ("manifest = 3\n", r"mine\.toml: manifest: give a table of names"),
+        ("[manifest]\nfile = 3\n", r"mine\.toml: manifest: give a table of names"),
+    ],
+)
+def test_wrong_names_of_a_manifest_are_refused(tmp_path: Path, given: str, line: str) -> None:
+    (tmp_path / "manifest.csv").write_text(OWN)
+    (tmp_path / "mine.toml").write_text(given)
+    with pytest.raises(UserError, match=line):
+        read_manifest(tmp_path / "manifest.csv", tmp_path / "mine.toml")
