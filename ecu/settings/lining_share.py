@@ -5,7 +5,8 @@ particles by the axles' emission models, or mass by their laws of wear (7.13). I
 least is where the next joule costs as much at either axle, and models of both have about the same power of
 the torque in them. The minimum is flat: of all shares within `FLAT` of it the one nearest to the configured
 distribution is taken. A model is asked within the range that it was trained on; below it emission goes with
-the torque.
+the torque. Laws of wear are off by a factor each, and what they save is little: a share counts with `DOUBT`
+sigma of what it moves, so only savings that the laws are sure of move it.
 
 Motors that may brake take all that they can: f of (5.2) is 1 for them.
 
@@ -39,6 +40,7 @@ V_IN, V_END, DECEL = 14.0, 4.0, 1.3  # m/s, m/s, m/s^2, of the reference applica
 LEAST_EACH: Final = 0.10  # of the linings' torque: discs stay clean, friction stays known
 SHARES: Final = np.linspace(LEAST_EACH, 1.0 - LEAST_EACH, 81)
 FLAT: Final = 0.005
+DOUBT: Final = 2.0  # sigma of the laws of wear
 HEADROOM: Final = 40.0  # K that the next brakings may add, and that a temperature may be too low
 UNKNOWN: Final = 30.0  # K in which emission is taken to grow e-fold, hotter than the model was trained on
 ADMITTED: Final = np.linspace(0.0, 1.0, 201)
@@ -53,10 +55,18 @@ def set_lining_share(row: Any, loads: tuple[Load, ...]) -> None:
     predict = particles if row["minimised"] == MINIMISED.index("dust") else worn_mass
     heat = HEAT_STEP * np.arange(HEAT_NODES)
     half = 0.5 * float(row["mass"]) * DECEL
-    front = [predict(row, FRONT, half * row["wheel_radius"][FRONT] * SHARES, t) for t in heat]
-    rear = [predict(row, REAR, half * row["wheel_radius"][REAR] * (1.0 - SHARES), t) for t in heat]
-    cost = np.array(front)[:, None] + np.array(rear)[None]
-    far = np.abs(SHARES - front_share(row, DECEL))
+    configured = front_share(row, DECEL)
+    shares = np.append(SHARES, configured)
+    front, rear = (
+        np.array([predict(row, at, half * row["wheel_radius"][at] * of, t) for t in heat])
+        for at, of in ((FRONT, shares), (REAR, 1.0 - shares))
+    )
+    cost = front[:, None, :-1] + rear[None, :, :-1]
+    if predict is worn_mass:
+        moved = (axle[:, :-1] - axle[:, -1:] for axle in (front, rear))
+        by_front, by_rear = (row["wear_sigma"][at] * m for at, m in zip((FRONT, REAR), moved, strict=True))
+        cost += DOUBT * np.hypot(by_front[:, None], by_rear[None])
+    far = np.abs(SHARES - configured)
     flat = cost <= (1.0 + FLAT) * cost.min(axis=-1, keepdims=True)
     row["wanted_share"] = SHARES[np.argmin(np.where(flat, far, np.inf), axis=-1)]
     row["least_share"], row["most_share"] = admitted_shares(row, loads)

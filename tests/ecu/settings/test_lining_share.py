@@ -72,17 +72,44 @@ def test_the_hotter_axle_gets_less_where_heat_emits_and_where_the_model_does_not
     assert table[cold, hot] > 0.8
 
 
-def test_wear_is_least_where_the_law_of_table_7_1_says_by_brute_force() -> None:
+@pytest.mark.parametrize("scale", [0.3, 0.8, 1.0, 1.3, 4.0])
+def test_wear_moves_the_share_where_its_laws_are_sure_that_it_saves(scale: float) -> None:
+    """By brute force: the least of mass and 2 sigma of what is moved; rear linings wear `scale` as fast."""
     config = car("suv", "wear")
-    worse = config.rear.model_copy(update={"pad": config.rear.pad.model_copy(update={"road_scale": 1.3})})
-    p = new_params(config.model_copy(update={"rear": worse}))[0]
-    y = np.linspace(LEAST_EACH, 1.0 - LEAST_EACH, 801)
+    rear = config.rear.model_copy(update={"pad": config.rear.pad.model_copy(update={"road_scale": scale})})
+    p = new_params(config.model_copy(update={"rear": rear}))[0]
+    base = front_share(p, DECEL)
     torque = 0.5 * p["mass"] * DECEL * p["wheel_radius"][0]
-    for front, rear in ((50.0, 50.0), (100.0, 50.0), (50.0, 150.0)):
-        mass = worn_mass(p, 0, torque * y, front) + worn_mass(p, 2, torque * (1.0 - y), rear)
-        found = wanted_share(p, np.array([front, front, rear, rear]))
-        there = float(np.interp(found, y, mass))
-        assert there <= (1.0 + FLAT) * mass.min() * (1.0 + 1e-3)
+
+    def axles(y, front: float, rear: float):
+        y = np.atleast_1d(y)
+        return np.array([worn_mass(p, 0, torque * y, front), worn_mass(p, 2, torque * (1.0 - y), rear)])
+
+    y = np.linspace(LEAST_EACH, 1.0 - LEAST_EACH, 801)
+    for heat in ((50.0, 50.0), (100.0, 50.0), (50.0, 150.0)):
+        found = wanted_share(p, np.repeat(heat, 2))
+        before = axles(base, *heat)
+        doubt = 2.0 * np.linalg.norm(p["wear_sigma"][[0, 2], None] * (axles(y, *heat) - before), axis=0)
+        counted = axles(y, *heat).sum(axis=0) + doubt
+        assert np.interp(found, y, counted) <= (1.0 + FLAT) * counted.min() * (1.0 + 1e-3)
+        moved = axles(found, *heat) - before
+        assert (
+            moved.sum() <= -2.0 * np.linalg.norm(p["wear_sigma"][[0, 2], None] * moved) + FLAT * before.sum()
+        )
+    alike = 0.8 <= scale <= 1.3
+    assert (abs(wanted_share(p, np.full(4, 50.0)) - base) < 0.01) == alike
+
+
+@pytest.mark.parametrize("ratio", [0.38, 0.5, 0.8, 1.0, 1.25, 2.0, 2.6])
+@pytest.mark.parametrize("power", [1.15, 1.25, 1.4])
+def test_no_share_saves_more_than_the_bound_of_the_docs(ratio: float, power: float) -> None:
+    """docs/control.md, "What can be saved at most": emission is convex, so it lies above its tangent."""
+    p = new_params(car("suv", "dust", law(4.0 + np.log10(ratio), power), law(4.0, power)))[0]
+    base, y = front_share(p, DECEL), p["wanted_share"][0, 0]
+    before = ratio * base**power + (1.0 - base) ** power
+    saved = 1.0 - (ratio * y**power + (1.0 - y) ** power) / before
+    share = ratio * base**power / before
+    assert -1e-3 <= saved <= power * abs(y - base) * abs(share - base) / (base * (1.0 - base)) + 1e-9
 
 
 def test_worn_mass_is_table_7_1_by_hand() -> None:
