@@ -60,12 +60,15 @@ def test_levels_explain_what_a_line_does_not(stops: Stops) -> None:
 
 
 @pytest.mark.parametrize("hotter", [0.0, 25.0], ids=["full factorial", "hotter at higher pressure"])
-def test_shares_of_inputs_that_go_together_are_not_added(stops: Stops, hotter: float) -> None:
+def test_what_inputs_that_go_together_explain_counts_once(stops: Stops, hotter: float) -> None:
     made = factorial(stops, (-0.1, 0.4, 0.6), 0.7)
     heated = made.start_temperature + hotter * (made.held_pressure / 1e6 - 1.0)
     found = principal_components(replace(made, start_temperature=heated))
     table = component_table(found)
-    assert (table.rows[-1][-1] == "–") == (hotter > 0.0)
+    overlap = found.any_form.sum() - found.together
+    assert overlap == pytest.approx(0.0, abs=1e-9) if hotter == 0.0 else overlap > 0.1
+    assert found.any_form.max() < found.together < 1.0
+    assert table.rows[-1][-1] == f"{100 * found.together:.1f}"
     assert ("their shares overlap" in table.below) == (hotter > 0.0)
 
 

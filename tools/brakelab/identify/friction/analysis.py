@@ -28,7 +28,7 @@ class Components(NamedTuple):
     linear: float  # share of friction's variance that straight lines explain
     any_form: Vector  # (3,), share that the mean at each level explains (eta squared)
     overlap: float  # largest correlation between two inputs: 0 in a full factorial
-    together: float  # share that the mean of each combination of levels would explain, without interactions
+    together: float  # share that the levels of all three explain, without interactions
 
 
 class History(NamedTuple):
@@ -67,7 +67,8 @@ def principal_components(stops: Stops) -> Components:
     shares = values / values.sum()
     with_friction = correlations[3, :3]
     inverse = np.linalg.inv(correlations[:3, :3])
-    any_form = np.array([_explained(stops.mean, level) for level in levels(inputs_of(stops)).T])
+    of_levels = [level[:, None] == np.unique(level) for level in levels(inputs_of(stops)).T]
+    any_form = np.array([_explained(stops.mean, columns) for columns in of_levels])
     return Components(
         vectors[:, :3],
         shares,
@@ -76,17 +77,15 @@ def principal_components(stops: Stops) -> Components:
         float(with_friction @ inverse @ with_friction),
         any_form,
         float(np.abs(correlations[:3, :3] - np.eye(3)).max()),
-        float(any_form.sum()),
+        _explained(stops.mean, np.hstack(of_levels)),
     )
 
 
-def _explained(values: Vector, level: Vector) -> float:
-    total = float(np.var(values))
-    means = np.empty_like(values)
-    for each in np.unique(level):
-        at = level == each
-        means[at] = values[at].mean()
-    return float(np.var(means)) / total
+def _explained(values: Vector, columns: NDArray[np.bool_]) -> float:
+    """Return the share of the variance of `values` that a sum over `columns`, shape (n, levels), explains."""
+    terms = columns.astype(np.float64)
+    fitted = terms @ np.linalg.lstsq(terms, values)[0]
+    return float(np.var(fitted) / np.var(values))
 
 
 def second_order(inputs: Matrix) -> Matrix:

@@ -108,9 +108,8 @@ def residual_table(judged: Judged, columns: Columns, stops: Stops) -> Table:
 def component_table(found: Components) -> Table:
     """Return the principal components of stops beside the true shares of variance.
 
-    Shares of inputs that go together are not added: they overlap.
+    The last row has what all inputs explain at once, which is less than the sum where they go together.
     """
-    added = found.overlap <= OVERLAP
     rows = [
         (name, *(f"{100 * value:+.1f}" for value in found.loadings[place]), *cells)
         for place, (name, cells) in enumerate(
@@ -121,7 +120,7 @@ def component_table(found: Components) -> Table:
                         (f"{r:+.2f}", f"{100 * r * r:.1f}", f"{100 * any_form:.1f}")
                         for r, any_form in zip(found.correlation, found.any_form, strict=True)
                     ),
-                    ("", f"{100 * found.linear:.1f}", f"{100 * found.together:.1f}" if added else "–"),
+                    ("", f"{100 * found.linear:.1f}", f"{100 * found.together:.1f}"),
                 ],
                 strict=True,
             )
@@ -131,10 +130,10 @@ def component_table(found: Components) -> Table:
         f"First three components: {100 * found.first_three:.1f} % of the variance of the four variables, "
         "which is not of friction. Loadings as in Table B.1; shares of the variance of mean friction."
     )
-    if not added:
+    if found.overlap > OVERLAP:
         below += (
             f" Inputs vary together here (correlation up to {found.overlap:.2f}): their shares overlap, "
-            "each is that of all it goes with, and their sum says nothing."
+            "each is that of all it goes with, and their sum says nothing; the last row counts them once."
         )
     columns = ("variable", "PC1 [%]", "PC2 [%]", "PC3 [%]", "r", "share, linear [%]", "share, any form [%]")
     return Table("Principal components", columns, rows, below)
