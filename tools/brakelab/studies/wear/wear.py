@@ -16,7 +16,7 @@ from brakelab.studies.wear.drives import CarDrives, drive_car
 from brakelab.studies.wear.study import LAWS, MODES, Law, Life, dynamometer_laws, live
 from ecu.contract.signals import CORNERS
 
-CARS: Final = 5
+CARS: Final = 10
 FIRST: Final = 2
 """Seed of the first car that is judged: `scatter` and `walk` were chosen on those before."""
 BAND: Final = 1.96
