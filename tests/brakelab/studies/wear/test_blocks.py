@@ -5,7 +5,7 @@ import pytest
 
 from brakelab.plant.wear_rig import AIR, TORQUE, T, wear_block
 from brakelab.simulation.campaigns.wear_blocks import drawn_car
-from brakelab.studies.wear.blocks import pair_of, repeated
+from brakelab.studies.wear.blocks import pair_of, repeated, sensitivity_table
 from brakelab.studies.wear.blocks_rig import CHECK_OFF, corner_of, energy_error, run_stops
 
 CORNER = corner_of(drawn_car(1), 0)
@@ -65,3 +65,12 @@ def test_new_linings_wear_more_at_first():
     assert found.rig[0] > 1.1 * found.rig[-1]
     assert 0.01 < found.without_weather < 0.2
     assert (np.diff(found.energy) > 0.0).all()
+
+
+@pytest.mark.parametrize("hot", ["first", "second"])
+def test_the_page_names_the_block_that_reacts_most_to_heat(hot: str) -> None:
+    """Regressors of (7.16): 10 MJ at 70 and at 200 degC."""
+    cool = np.array([10.0, 700.0, 5e4, 8.0, 600.0, 0.2, 15.0])
+    heated = np.array([10.0, 2000.0, 4e5, 8.0, 1700.0, 0.9, 150.0])
+    table = sensitivity_table({name: heated if name == hot else cool for name in ("first", "second")})
+    assert f"extended law 6.2 % in {hot}, quasi-static law 6.8 % in {hot}" in table.below
