@@ -5,10 +5,12 @@ It changes its own records of `STATE`, the learned values, and `estimate`, which
 
 import math
 
+from ecu.algorithm.estimate import STANDING
 from ecu.algorithm.estimation.friction import update_pressure
 from ecu.algorithm.estimation.joint.ceiling import follow_ceiling
 from ecu.algorithm.estimation.joint.drive import compare_drive
 from ecu.algorithm.estimation.joint.estimates import tell_joint
+from ecu.algorithm.estimation.joint.layout import V
 from ecu.algorithm.estimation.joint.learned import hand_over_level, keep_joint, restore_joint
 from ecu.algorithm.estimation.joint.observer import update_joint
 from ecu.algorithm.estimation.joint.prediction import (
@@ -167,6 +169,8 @@ def _observe_jointly(
     if braking and joint.closed:
         if not p.transmit:
             add_to_whole(p, s.whole, joint)
+            if joint.x[V] < STANDING:  # held brakes, and the end of a log, teach no more
+                end_whole(s.whole)
         if not s.whole.alone:
             add_window(p, s.prediction, joint, u)
     s.prediction.reported_s = max(s.prediction.reported_s - dt, 0.0)

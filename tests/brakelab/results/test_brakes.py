@@ -137,12 +137,16 @@ def test_blocks_join_without_a_seam(params: RecordArray, block: int) -> None:
     np.testing.assert_equal(pieces.rows, whole.rows)
 
 
-def test_a_log_that_ends_in_a_braking_ends_the_braking(params: RecordArray) -> None:
+@pytest.mark.parametrize(("last", "learning"), [(5.0, "the log ends first"), (0.0, LEARNED)])
+def test_a_log_that_ends_in_a_braking_ends_the_braking(
+    params: RecordArray, last: float, learning: str
+) -> None:
     t, rows = stop(params)
+    rows[399, OUTPUT["vehicle_speed"]] = last
     lines = book(params, t[:400], rows[:400]).rows
     assert len(lines) == 4
     assert lines[0].duration == pytest.approx(3.0)
-    assert lines[0].learning == "the log ends first"
+    assert lines[0].learning == learning
 
 
 def no_observation(rows: np.ndarray) -> None:

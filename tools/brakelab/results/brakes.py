@@ -285,7 +285,8 @@ class BrakeBook:
         if len(self._t) and self._rows[-1, OUTPUT["braking"]] == 1.0:
             first = int(np.argmax(self._rows[:, OUTPUT["braking"]] == 1.0))
             self._close(self._t, self._rows, first, len(self._t))
-            self.rows[-4:] = [row._replace(learning="the log ends first") for row in self.rows[-4:]]
+            if not self._rows[-1, OUTPUT["vehicle_speed"]] < STANDING:
+                self.rows[-4:] = [row._replace(learning="the log ends first") for row in self.rows[-4:]]
         self._t, self._rows = np.empty(0), np.empty((0, 0))
 
     def _close(self, t: Vector, rows: Vector, start: int, end: int) -> None:

@@ -168,9 +168,13 @@ def begin_whole(params: Record, state: Record, joint: Record) -> None:
         _hand_over_scale(state, joint)
     state.alone = 1 if alone else 0
     state.knee = WHEELS_KNEE if apart else ONE_SPEED_KNEE
-    state.bent = 0
-    state.common = joint.sampling.common
-    state.age_s = state.time = state.measured = state.expected = state.linings = state.total = 0.0
+    state.bent, state.age_s, state.common = 0, 0.0, joint.sampling.common
+    _open_mean(state)
+
+
+@kernel
+def _open_mean(state: Record) -> None:
+    state.time = state.measured = state.expected = state.linings = state.total = 0.0
     state.by_scale = state.by_grip = 0.0
 
 
@@ -268,7 +272,7 @@ def _believe_windows(state: Record) -> None:
 
 @kernel
 def end_whole(state: Record) -> None:
-    """Correct the states by the mean of this application, if it was measured."""
+    """Correct the states by the mean of this application up to now, if it was measured, and open another."""
     linings = state.linings >= LEAST_DECEL * state.time
     if state.time < LEAST_S or not (linings or state.total >= LEAST_TOTAL * state.time):
         return
@@ -298,6 +302,7 @@ def end_whole(state: Record) -> None:
     state.noise_ratio = min(max(state.noise_ratio, LEAST_NOISE), GREATEST_NOISE)
     if linings:
         state.usual = state.linings / state.time
+    _open_mean(state)
 
 
 @kernel

@@ -109,3 +109,27 @@ def test_a_stream_in_doubt_teaches_no_whole_application(
         inputs["e2e_unsure"] = brakes and k < 100 + 100 * doubted_s
         step(params, state, inputs, outputs)
     assert state["whole"]["time"][0] == pytest.approx(measured_s, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("case", "to", "teaches"), [("still rolls", 2.0, False), ("held at rest", 0.0, True)]
+)
+def test_a_stop_teaches_before_its_brakes_are_released(
+    params, feed, case: str, to: float, teaches: bool
+) -> None:
+    """A shadow sees a braking at 4 m/s^2, and a second in which nothing changes; the log ends there."""
+    car, state, outputs = params[0], new_state(params), np.zeros(1, OUTPUTS)
+    car["transmit"] = 0
+    inputs, speed = feed(), 14.0
+    for k in range(600):
+        slows = k >= 100 and speed > to
+        speed -= 0.04 * slows
+        feed(
+            inputs,
+            wheel_speed=speed / car["wheel_radius"],
+            calliper_pressure=40.0 * (k >= 100),
+            accel_x=-4.0 * slows,
+            yaw_rate=0.0,
+        )
+        step(params, state, inputs, outputs)
+    assert (state["learned"]["mu_b"][0] != car["mu_nominal"]).all() == teaches

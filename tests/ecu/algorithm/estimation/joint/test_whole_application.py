@@ -358,6 +358,9 @@ def test_a_light_braking_teaches_where_the_car_slows(
     before = bystander.state["x"].copy()
     bystander.brake([bar] * 30, [decel] * 30)
     assert bool((bystander.state["x"] != before).any()) == teaches
+    taught = bystander.state.copy()
+    end_whole(bystander.state)
+    assert not teaches or bystander.state == taught  # once
     assert bystander.state["usual"] == (USUAL if bar < 10.0 else pytest.approx(bystander.linings(bar)))
 
 
