@@ -1,6 +1,6 @@
 """How well the product predicts the next braking of strangers' cars, beside simple predictors.
 
-    python -m tests.wide_world.judge [--cars 0-29] [--seed 1] [--workers 2] [--json FILE] [--keep DIR]
+    python -m tests.wide_world.judge [--cars 0-29] [--seed 1] [--json FILE] [--svg FILE] [--keep DIR]
 
 Judged is the mean deceleration of each braking beyond 1.5 m/s^2, over the rows that a force balance can judge
 (`brakings`): predicted from its pressures and from what was known before it, against what the accelerometer
@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from brakelab.api import Result, replay
+from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, Line, Panel, write_chart
 
 from .brakings import Braking, Signals, find, lining_decel, read, rest_decel
 from .config import Nominal
@@ -183,6 +184,31 @@ def table(
     return "\n".join(lines)
 
 
+def _errors_over_sigma(judged: list[Judged]) -> dict[str, np.ndarray]:
+    """Return the magnitudes of error over sigma of every predictor that states sigma."""
+    found: dict[str, list[float]] = {}
+    for one in judged:
+        if not np.isnan(one.sigma):
+            found.setdefault(one.predictor, []).append(abs(one.predicted - one.measured) / one.sigma)
+    return {predictor: np.array(off) for predictor, off in found.items()}
+
+
+def draw_calibration(judged: list[Judged], path: Path) -> None:
+    """Draw the share inside k sigma of every predictor that states sigma, beside the normal distribution."""
+    k = np.linspace(0.0, SIGMAS[-1], 61)
+    normal = np.array([100.0 * math.erf(one / 2**0.5) for one in k])
+    lines, legend = [Line(k, normal, GREY, dashed=True)], [("normal distribution", GREY)]
+    for (predictor, off), colour in zip(
+        _errors_over_sigma(judged).items(), (GREEN, ORANGE, BLUE), strict=False
+    ):
+        share = np.array([100.0 * np.mean(off <= one) for one in k])
+        lines.append(Line(k, share, colour))
+        legend.append((predictor, colour))
+    write_chart(
+        path, [Panel("share inside k sigma [%]", "k", (0.0, SIGMAS[-1]), (0.0, 100.0), lines)], legend
+    )
+
+
 def calibration(judged: list[Judged]) -> str:
     """Return a Markdown table of the share inside k sigma [%] of every predictor that states sigma."""
     lines = [
@@ -190,11 +216,11 @@ def calibration(judged: list[Judged]) -> str:
         "| --- |" + " --- |" * (len(SIGMAS) + 1),
         "| normal distribution | " + " | ".join(f"{100 * math.erf(k / 2**0.5):.0f}" for k in SIGMAS) + " | |",
     ]
-    for predictor in dict.fromkeys(one.predictor for one in judged if not np.isnan(one.sigma)):
-        mine = [one for one in judged if one.predictor == predictor and not np.isnan(one.sigma)]
-        off = np.array([abs(one.predicted - one.measured) / one.sigma for one in mine])
+    for predictor, off in _errors_over_sigma(judged).items():
         share = " | ".join(f"{100 * np.mean(off <= k):.0f}" for k in SIGMAS)
-        median = np.median([100.0 * one.sigma / one.measured for one in mine])
+        median = np.nanmedian(
+            [100.0 * one.sigma / one.measured for one in judged if one.predictor == predictor]
+        )
         lines.append(f"| {predictor} | {share} | {median:.1f} |")
     return "\n".join(lines)
 
@@ -246,6 +272,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--json", type=Path, metavar="FILE", help="every prediction of every braking")
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="the share inside k sigma as a picture")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="logs, configurations, truths and results")
     asked = parser.parse_args(arguments)
     began, judged = time.monotonic(), []
@@ -267,6 +294,8 @@ def main(arguments: list[str] | None = None) -> int:
             json.dumps([one._asdict() | {"sigma": one.sigma if one.sigma > 0.0 else None} for one in judged]),
             "utf-8",
         )
+    if asked.svg:
+        draw_calibration(judged, asked.svg)
     return 0
 
 

@@ -1,5 +1,6 @@
 """The judgement: what is taken of the product's results, the tables, and thirty cars."""
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 from .brakings import find, read
-from .judge import Judged, judge_car, main, published, report, tabled
+from .judge import Judged, draw_calibration, judge_car, main, published, report, tabled
 from .logger import CORNERS
 from .route import G
 from .test_brakings import NOMINAL, pulse, signals
@@ -92,6 +93,22 @@ def test_tables_pool_split_and_number() -> None:
     assert "| filter | 6.0/9 50 | 10.0/10 0 | 2.0/2 100 |" in text
     assert "| never learning | 10.0 (+10) | 10.0 (-10) |" in text
     assert "| filter | 6.0/9 50 | 10.0/10 0 |" in text, "without rain and with it"
+
+
+def test_the_share_inside_k_sigma_is_drawn(tmp_path: Path) -> None:
+    """Errors of 0, 1 and 2 sigma: a step of a third at each, the last at two thirds of the axis."""
+    judged = [Judged(0, "A", (), n, "filter", 5.0 + 0.2 * n, 5.0, 0.2) for n in range(3)]
+    draw_calibration(judged, out := tmp_path / "calibration.svg")
+    text = out.read_text("utf-8")
+    assert "normal distribution" in text
+    assert "filter" in text
+    paths = [
+        [tuple(map(float, pair.split(","))) for pair in line.split()]
+        for line in re.findall(r'points="([^"]+)"', text)
+    ]
+    top, bottom = paths[0][-1][1], paths[0][0][1]
+    shares = [round(3.0 * (bottom - y) / (bottom - top)) for _, y in paths[1]]
+    assert [shares[0], shares[19], shares[21], shares[39], shares[41]] == [1, 1, 2, 2, 3]
 
 
 @pytest.mark.compiled
