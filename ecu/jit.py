@@ -237,8 +237,15 @@ def interprets() -> bool:
 @cache
 def text_digest(module: str) -> str | None:
     """Return what stands for the text of a module, None without one."""
-    path = _modules(module.partition(".")[0]).get(module)
-    return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
+    package, *inside = module.split(".")
+    spec = find_spec(package)
+    if spec is None or not spec.origin:
+        return None
+    path = Path(spec.origin)
+    if inside:
+        path = path.parent.joinpath(*inside)
+        path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None
 
 
 @cache
@@ -296,8 +303,11 @@ def module_of(function: Callable[..., Any]) -> str:
 def dispatcher(function: Callable[..., Any], parallel: bool = False, nogil: bool = False) -> Any:
     """Return numba's dispatcher of a kernel, with its cache."""
     numba = compiler()
-    numba.config.CACHE_DIR = _folder(module_of(function))
-    return numba.njit(**OPTIONS, parallel=parallel, nogil=nogil)(function)
+    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, _folder(module_of(function))
+    try:
+        return numba.njit(**OPTIONS, parallel=parallel, nogil=nogil)(function)
+    finally:
+        numba.config.CACHE_DIR = before  # functions of others do not go into a folder named after these texts
 
 
 class Kernel:
