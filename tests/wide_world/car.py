@@ -8,9 +8,10 @@ Loads shift with the specific force a lag behind. 10 ms a row, four steps in eac
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from ecu.jit import kernel
 
 from .driver import Driver, Engine, accelerate, decide, meant_ahead, press, yield_to_lock
 from .lining import Brake, friction, rear_pressure
@@ -75,7 +76,7 @@ class Car(NamedTuple):
     abs_: Abs
 
 
-@numba.njit(cache=True)
+@kernel
 def share_load(state: NDArray[np.void], body: Body, down: float, bounce: float) -> None:
     """Write the wheel loads at a downforce [N]; a kerb adds the share `bounce` right and takes it left."""
     rear = body.front_axle / body.wheelbase
@@ -90,7 +91,7 @@ def share_load(state: NDArray[np.void], body: Body, down: float, bounce: float) 
         state.load[i] = max(load, 0.005 * state.mass * G)
 
 
-@numba.njit(cache=True)
+@kernel
 def slip_control(abs_: Abs, cut: float, slip: float, speed: float, bearable: float, dt: float) -> float:
     """Return which share of the pressure comes to a wheel after dt.
 
@@ -112,7 +113,7 @@ def slip_control(abs_: Abs, cut: float, slip: float, speed: float, bearable: flo
     return min(cut + abs_.rate * dt, 1.0)
 
 
-@numba.njit(cache=True)
+@kernel
 def rub(state: NDArray[np.void], brake: Brake, ambient: float, scatter: float) -> None:
     """Write disc temperatures, work and friction of the linings; `scatter` is this braking's own factor."""
     cooling = brake.cooling + brake.cooling_by_speed * state.speed
@@ -128,7 +129,7 @@ def rub(state: NDArray[np.void], brake: Brake, ambient: float, scatter: float) -
         )
 
 
-@numba.njit(cache=True)
+@kernel
 def turn_wheel(
     state: NDArray[np.void],
     car: Car,
@@ -174,7 +175,7 @@ def turn_wheel(
     return inertia
 
 
-@numba.njit(cache=True)
+@kernel
 def move(
     state: NDArray[np.void], car: Car, route: Route, bounce: float, recuperated: float, dt: float
 ) -> None:
@@ -209,7 +210,7 @@ def move(
     state.specific_force, state.resistance = specific, resisting / state.mass
 
 
-@numba.njit(cache=True)
+@kernel
 def drive(
     car: Car, route: Route, start: Start, tremor: Values, scatter: Values, rows: NDArray[np.void]
 ) -> int:

@@ -7,9 +7,10 @@ locked, and presses less from then on.
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from ecu.jit import kernel
 
 from .route import G, Route
 from .state import ROW
@@ -51,7 +52,7 @@ class Engine(NamedTuple):
     blend: float  # share of the braking demand for the motors
 
 
-@numba.njit(cache=True)
+@kernel
 def change_gear(engine: Engine, gear: int, wheel: float, braking: bool) -> int:
     """Return the gear that a driver takes at this speed of the driven wheels [rad/s]."""
     turning = wheel * engine.ratios[gear]
@@ -63,7 +64,7 @@ def change_gear(engine: Engine, gear: int, wheel: float, braking: bool) -> int:
     return gear
 
 
-@numba.njit(cache=True)
+@kernel
 def meant_ahead(route: Route, place: int, speed: float) -> tuple[float, float]:
     """Return the least speed [m/s] and the deceleration [m/s^2] meant within the next 0.15 s."""
     ahead = min(place + int(0.15 * speed), len(route.speed) - 2)
@@ -73,7 +74,7 @@ def meant_ahead(route: Route, place: int, speed: float) -> tuple[float, float]:
     return least, route.decel[ahead]
 
 
-@numba.njit(cache=True)
+@kernel
 def decide(state: NDArray[np.void], route: Route, too_fast: float, demand: float) -> None:
     """Begin a braking, or a stop, or drive on from one."""
     place = int(state.distance)
@@ -93,7 +94,7 @@ def decide(state: NDArray[np.void], route: Route, too_fast: float, demand: float
         state.trim *= 0.6
 
 
-@numba.njit(cache=True)
+@kernel
 def press(
     state: NDArray[np.void], driver: Driver, engine: Engine, route: Route, radius: float, tremor: float,
     too_fast: float, demand: float,
@@ -135,7 +136,7 @@ def press(
     return recuperated
 
 
-@numba.njit(cache=True)
+@kernel
 def yield_to_lock(state: NDArray[np.void], driver: Driver) -> None:
     """Let go some time after a wheel has locked, and press again."""
     if state.braking and state.speed > 4.0 and np.max(state.slip) > LOCKED:
@@ -146,7 +147,7 @@ def yield_to_lock(state: NDArray[np.void], driver: Driver) -> None:
     state.relax += (1.0 - state.relax) * ROW / 1.0
 
 
-@numba.njit(cache=True)
+@kernel
 def accelerate(
     state: NDArray[np.void], driver: Driver, engine: Engine, grip: float, radius: float, meant: float
 ) -> None:

@@ -14,8 +14,9 @@ Kinds of lining, level mu_0 and strength a:
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
+
+from ecu.jit import kernel
 
 CONSTANT, RISING, FADING, LOAD_AND_SPEED, GREEN = range(5)
 
@@ -41,7 +42,7 @@ class Brake(NamedTuple):
     lag: float  # calliper behind line pressure [s]
 
 
-@numba.njit(cache=True)
+@kernel
 def friction(
     brake: Brake, level: float, temperature: float, pressure: float, speed: float, work: float
 ) -> float:
@@ -64,7 +65,7 @@ def warm_level(kind: int, strength: float) -> float:
     return 1.0 + 0.6 * strength if kind == RISING else 1.0
 
 
-@numba.njit(cache=True)
+@kernel
 def rear_pressure(brake: Brake, front: float) -> float:
     """Return the rear line pressure [bar] to a front one."""
     if front < brake.valve_knee:

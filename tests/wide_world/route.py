@@ -7,9 +7,10 @@ with the deceleration that the driver dares there: what braking and turning shar
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from ecu.jit import kernel
 
 G = 9.81
 Values = NDArray[np.float64]
@@ -78,7 +79,7 @@ def lay(straights: list[Straight], slope: float, rng: np.random.Generator) -> La
     return Lap(curvature, grade, kerb, limit, stop, zone.astype(np.int64))
 
 
-@numba.njit(cache=True)
+@kernel
 def meant_speed(
     curvature: Values, grip: Values, limit: Values, stop: Values, decel: Values, lateral: float, lift: float,
     daring: Values,

@@ -12,8 +12,9 @@ slope 1 at the origin and greatest value 1, of one of three kinds:
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
+
+from ecu.jit import kernel
 
 BRUSH, DUGOFF, EXPONENTIAL = range(3)
 DECAY = 3.0, 12.0  # x over which the friction of brush and Dugoff falls
@@ -31,7 +32,7 @@ class Tyre(NamedTuple):
     load: float  # F_z0 [N]
 
 
-@numba.njit(cache=True)
+@kernel
 def _unscaled(kind: int, x: float, shape: float, fall: float) -> float:
     if kind == BRUSH:
         if x < 3.0:
@@ -46,7 +47,7 @@ def _unscaled(kind: int, x: float, shape: float, fall: float) -> float:
     return rise if y < 1.0 else 1.0 - fall + fall * rise
 
 
-@numba.njit(cache=True)
+@kernel
 def curve(tyre: Tyre, x: float) -> float:
     """Return g(x) for x >= 0."""
     return _unscaled(tyre.kind, x * tyre.top, tyre.shape, tyre.fall) / tyre.top
@@ -57,7 +58,7 @@ def greatest(kind: int, shape: float, fall: float) -> float:
     return max(_unscaled(kind, x, shape, fall) for x in np.arange(0.01, 40.0, 0.01))
 
 
-@numba.njit(cache=True)
+@kernel
 def grip_left(tyre: Tyre, load: float, grip: float, lateral: float) -> float:
     """Return the peak longitudinal friction that load and cornering leave.
 
@@ -71,14 +72,14 @@ def grip_left(tyre: Tyre, load: float, grip: float, lateral: float) -> float:
     return peak * np.sqrt(max(1.0 - (lateral / peak) ** 2, 0.04))
 
 
-@numba.njit(cache=True)
+@kernel
 def braking_force(tyre: Tyre, slip: float, load: float, left: float) -> float:
     """Return the force [N] against the motion, negative for negative slip; `left` is that of `grip_left`."""
     force = left * load * curve(tyre, tyre.stiffness * abs(slip) / left)
     return force if slip >= 0.0 else -force
 
 
-@numba.njit(cache=True)
+@kernel
 def spin(
     tyre: Tyre, omega: float, speed: float, torque: float, inertia: float, radius: float, load: float,
     left: float, dt: float,
