@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
+from brakelab.bench.log_formats import FORMATS, convert
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
 from ecu.contract.records import FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
 from ecu.jit import Record
 
+DATA = Path(__file__).parents[2] / "data"
+TEXT = (".log", ".asc", ".trc")
 FD_LENGTHS = [*range(9), 12, 16, 20, 24, 32, 48, 64]
 STAMPS = st.integers(0, 10_000_000).map(lambda us: 1_600_000_000 + us / 1e6)
 
@@ -25,6 +28,16 @@ def berlin(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     yield
     monkeypatch.undo()
     time.tzset()
+
+
+@pytest.fixture(scope="module")
+def kona(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The drive of the Kona (two buses) in every format; by time, as python-can's writers want it."""
+    folder = tmp_path_factory.mktemp("kona")
+    lines = (DATA / "kona.log").read_text().splitlines(keepends=True)
+    (folder / "sorted.log").write_text("".join(sorted(lines, key=lambda line: line.split()[0])))
+    logs = {end: convert(folder / "sorted.log", folder / f"kona{end}") for end in FORMATS}
+    return logs | {"sorted": folder / "sorted.log"}
 
 
 def read(path: Path, interfaces: list[str] | None = None) -> tuple[RecordArray, LogQuality]:
