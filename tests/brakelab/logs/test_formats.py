@@ -200,7 +200,7 @@ def test_without_asammdf_mdf_names_the_remedy(
         kind_of(path)
 
 
-@pytest.mark.parametrize("module", ["ecu.bus.channel", "brakelab.mapping.command"])
+@pytest.mark.parametrize("module", ["ecu.bus.channel", "brakelab.mapping.command", "brakelab.rig.live"])
 def test_the_bus_is_imported_without_asammdf(module: str) -> None:
     program = (
         f"import sys, {module}; assert 'asammdf' not in sys.modules; "
