@@ -124,7 +124,7 @@ def gather(
     turning = motion.yaw_rate * x[V]  # a bend shows in both, a bank or a zero in one alone
     w.across += (motion.accel_y if abs(motion.accel_y) < abs(turning) else turning) / GRAVITY
     w.lateral += front_lateral * sin_steering(motion)
-    fastest, age = -1.0, 0.0
+    timed, fastest, age = not params.mapped[ACCEL_X], -1.0, 0.0
     for i in range(4):
         w.load[i] += load[i]
         w.motor[i] += motor_torque(inputs, i)
@@ -138,7 +138,7 @@ def gather(
             w.omega[i] += value[place]
             w.ground[i] += corner_speed(params, motion, x[V] - 1e-9 * inputs.age_ns[place] * change, i)
             w.omega_samples[i] += 1
-            if abs(value[place]) * params.wheel_radius[i] > fastest:
+            if timed and abs(value[place]) * params.wheel_radius[i] > fastest:
                 fastest, age = abs(value[place]) * params.wheel_radius[i], 1e-9 * inputs.age_ns[place]
         place = CALLIPER_PRESSURE + i
         push_out = params.push_out_pressure[i] / BAR
@@ -157,9 +157,9 @@ def gather(
         w.reference += value[place] - (x[V] - delay * change)
         w.reference_change += change
         w.reference_samples += 1
-        if not wheels_mapped(params):
+        if timed and not wheels_mapped(params):
             fastest, age = value[place], delay
-    if fastest >= 0.0 and not params.mapped[ACCEL_X]:
+    if fastest >= 0.0:
         add_speed(state.sampling, fastest, age)
 
 
