@@ -277,8 +277,8 @@ def test_an_argument_fits_where_numba_would_run_the_same_code(
     assert library.fits(*specs) is fits
 
 
-def _kernels_that_python_calls(package: str) -> set[str]:
-    """Return the kernels named outside kernels, by full name."""
+def _kernels_that_python_calls(package: str, but: tuple[str, ...] = ()) -> set[str]:
+    """Return the kernels named outside kernels, by full name, but in modules that begin with one of `but`."""
     trees = {}
     root = Path(importlib.import_module(package).__file__ or "").parent
     for path in root.rglob("*.py"):
@@ -287,12 +287,14 @@ def _kernels_that_python_calls(package: str) -> set[str]:
 
     def is_kernel(node: ast.AST) -> bool:
         return isinstance(node, ast.FunctionDef) and any(
-            isinstance(one, ast.Name) and one.id == "kernel" for one in node.decorator_list
+            isinstance(one, ast.Name) and one.id in ("kernel", "batch_kernel") for one in node.decorator_list
         )
 
     kernels = {(m, f.name) for m, tree in trees.items() for f in tree.body if is_kernel(f)}  # type: ignore[attr-defined]
     called = set()
     for module, tree in trees.items():
+        if module.startswith(but):
+            continue
         names = {
             alias.asname or alias.name: (node.module, alias.name)
             for node in ast.walk(tree)
@@ -319,6 +321,15 @@ def test_a_library_holds_every_kernel_of_the_ecu_that_python_calls() -> None:
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT
     )
     assert _kernels_that_python_calls("ecu") <= set(done.stdout.split())
+
+
+def test_the_laboratory_s_library_holds_every_kernel_that_a_command_calls() -> None:
+    """Only studies, benchmarks and the parts of the plant are compiled by numba when they are called."""
+    made = jit.library("brakelab")
+    if made is None or jit.library_of("brakelab.replay.engine") is None:
+        pytest.skip("no library of these texts: python -m brakelab.build")
+    called = _kernels_that_python_calls("brakelab", ("brakelab.studies", "brakelab.bench", "brakelab.plant"))
+    assert called <= set(made.manifest["kernels"])
 
 
 BRAKING = """

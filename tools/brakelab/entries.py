@@ -1,15 +1,29 @@
 """Kernels of the laboratory that its commands call, called once: `ecu/build.py` sees from it what to compile.
 
-Those of studies, benchmarks and identifications are not among them: numba compiles them when they run.
+Those of studies and benchmarks alone are not among them: numba compiles them when they run.
 """
 
 import numpy as np
 
 from brakelab.fmu.vehicle_cycle import go_on, measure
+from brakelab.identify.friction.columns import Columns
+from brakelab.identify.friction.discovery import library, shoot
+from brakelab.identify.friction.dynamometer import new_bench
+from brakelab.identify.friction.fit import replayed
+from brakelab.identify.friction.trips import drive
 from brakelab.identify.tuning.recording import Recording
 from brakelab.identify.tuning.replay import replay_errors
 from brakelab.mapping.series import FEWEST_FRAMES, read_series
+from brakelab.plant.description import read_file
 from brakelab.plant.disc import cooling_rate
+from brakelab.plant.dynamometer import PRESSURE, new_stop
+from brakelab.plant.friction.constant import Constant
+from brakelab.plant.friction.law import START
+from brakelab.plant.friction.laws import friction, law_row
+from brakelab.plant.linings import Linings
+from brakelab.plant.wear import pad_wear
+from brakelab.simulation.campaigns.dust_trips import campaign
+from brakelab.simulation.campaigns.wear_blocks import drawn_car, run_block
 from brakelab.simulation.ecu_inputs import ecu_inputs
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.vehicle_bus import N_TRUTH, new_noise, new_values, new_vehicle
@@ -23,8 +37,9 @@ from ecu.settings.resources import resource
 
 
 def call_every_entry() -> None:
-    """Call what `simulate`, `rig`, `demo`, `replay`, `map`, `tune` and FMUs call."""
+    """Call what `simulate`, `rig`, `demo`, `replay`, `map`, `tune`, `lab`, `identify` and FMUs call."""
     compile_all()
+    _run_laboratory()
     recording = Recording(new_record(INPUTS, 2), np.ones((2, 4)), np.zeros(2, np.int64))
     replay_errors([recording], [load_config(resource("config/suv.toml"))])
     ecu_inputs(new_record(FRAME), 1)
@@ -39,3 +54,27 @@ def call_every_entry() -> None:
     noise, values, row = new_noise(0), new_values(), np.zeros(N_TRUTH)
     measure(vehicle, noise, values, row)
     go_on(vehicle, np.zeros(1, target_dtype(N_OUTPUTS))[0], noise, values, row)
+
+
+def _run_laboratory() -> None:
+    """Measure, fit and discover on the dynamometer; run a block of wear and a trip of dust."""
+    lining = read_file(resource("config/plant/linings.toml"), Linings).lining["A"]
+    bench = new_bench(lining, "A", 0)
+    rig = bench.rig[0]
+    columns = Columns.own(lining, float(rig["mass"] * rig["tyre_radius"] ** 2))
+    stops = drive(bench, columns, 0).stops
+    new_bench(lining, "A", 0, law="SIM").measure(new_stop(PRESSURE, 10.0, 5.0, 100.0, pressure=20e5))
+    law = Constant(law="constant", rig_mass=1000.0, mu=0.4)
+    replayed(law, columns.brake, stops, True)
+    number, row = law_row(law, columns.brake)
+    friction(number, row, row[START], 20e5, 5.0, 0.0, 100.0, 0.0)
+    terms = library(stops)
+    weights = np.zeros(terms.levels.shape[1] + len(terms.kinds))
+    shoot(
+        terms.levels, terms.rates, terms.kinds, weights, stops.first, stops.dt, np.zeros_like(stops.pressure)
+    )
+    stop = np.array([[10.0, 5.0, 3.0, 1.0]])  # from and to m/s, m/s^2, s before
+    car = drawn_car(0)
+    run_block(car, 0, "", stop, 0.0, np.random.default_rng(0))
+    pad_wear(car[0]["wear_row"][0], 1.0)
+    campaign(0, trips=1)
