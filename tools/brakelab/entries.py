@@ -17,12 +17,12 @@ from brakelab.mapping.series import FEWEST_FRAMES, read_series
 from brakelab.plant.description import read_file
 from brakelab.plant.disc import cooling_rate
 from brakelab.plant.dynamometer import PRESSURE, new_stop
+from brakelab.plant.emission_rig import EMITTED, TRIP, run_trip
 from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.law import START
 from brakelab.plant.friction.laws import friction, law_row
 from brakelab.plant.linings import Linings
 from brakelab.plant.wear import pad_wear
-from brakelab.simulation.campaigns.dust_trips import campaign
 from brakelab.simulation.campaigns.wear_blocks import drawn_car, run_block
 from brakelab.simulation.ecu_inputs import ecu_inputs
 from brakelab.simulation.scenario import load_scenario
@@ -62,7 +62,7 @@ def _run_laboratory() -> None:
     bench = new_bench(lining, "A", 0)
     rig = bench.rig[0]
     columns = Columns.own(lining, float(rig["mass"] * rig["tyre_radius"] ** 2))
-    stops = drive(bench, columns, 0).stops
+    stops = drive(bench, columns, 0, 1).stops
     new_bench(lining, "A", 0, law="SIM").measure(new_stop(PRESSURE, 10.0, 5.0, 100.0, pressure=20e5))
     law = Constant(law="constant", rig_mass=1000.0, mu=0.4)
     replayed(law, columns.brake, stops, True)
@@ -77,4 +77,5 @@ def _run_laboratory() -> None:
     car = drawn_car(0)
     run_block(car, 0, "", stop, 0.0, np.random.default_rng(0))
     pad_wear(car[0]["wear_row"][0], 1.0)
-    campaign(0, trips=1)
+    trip, out = np.zeros(1, TRIP), np.zeros((1, EMITTED + 1))
+    run_trip(car[0], 0, trip[0], np.zeros((1, 3)), np.ones(1), np.ones(1), out)

@@ -36,15 +36,15 @@ class Trip(NamedTuple):
     lumped: Stops
 
 
-def drive(bench: Bench, columns: Columns, seed: int) -> Trip:
-    """Return a trip on `bench`, drawn by `seed`."""
+def drive(bench: Bench, columns: Columns, seed: int, brakings: int = BRAKINGS) -> Trip:
+    """Return a trip of so many brake applications on `bench`, drawn by `seed`."""
     random = np.random.default_rng(seed)
     rig = bench.rig[0]
     ambient, still, by_speed = rig["ambient"], rig["cooling"], rig["cooling_by_speed"]
     lever = 2.0 * rig["piston_area"] * rig["effective_radius"]
     lumped = bench.temperature
     parts, estimated = [], []
-    for _ in range(BRAKINGS):
+    for _ in range(brakings):
         speed = float(random.uniform(30.0, 130.0)) * KMH
         end = speed * float(random.uniform(0.1, 0.7))
         wanted = float(np.clip(1.1 * np.exp(0.55 * random.standard_normal()), 0.4, 3.5))
