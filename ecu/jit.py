@@ -8,8 +8,7 @@ read.
 
 `NUMBA_CACHE_DIR` chooses the place, default `~/.cache/brake-ecu`; it may be read-only where nothing has to be
 compiled. What lies there is run (numba's cache is pickle and machine code), so a place in which anybody else
-may put or exchange files is refused. With
-`NUMBA_DISABLE_JIT=1` kernels run as plain Python (`ecu/interpreted.py`).
+may put or exchange files is refused. With `NUMBA_DISABLE_JIT=1` kernels run as plain Python.
 """
 
 import errno
@@ -237,15 +236,8 @@ def interprets() -> bool:
 @cache
 def text_digest(module: str) -> str | None:
     """Return what stands for the text of a module, None without one."""
-    package, *inside = module.split(".")
-    spec = find_spec(package)
-    if spec is None or not spec.origin:
-        return None
-    path = Path(spec.origin)
-    if inside:
-        path = path.parent.joinpath(*inside)
-        path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None
+    path = _modules(module.partition(".")[0]).get(module)
+    return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 @cache
@@ -304,10 +296,9 @@ def dispatcher(function: Callable[..., Any], parallel: bool = False, nogil: bool
     """Return numba's dispatcher of a kernel, with its cache."""
     numba = compiler()
     before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, _folder(module_of(function))
-    try:
-        return numba.njit(**OPTIONS, parallel=parallel, nogil=nogil)(function)
-    finally:
-        numba.config.CACHE_DIR = before  # functions of others do not go into a folder named after these texts
+    made = numba.njit(**OPTIONS, parallel=parallel, nogil=nogil)(function)
+    numba.config.CACHE_DIR = before  # functions of others do not go into a folder named after these texts
+    return made
 
 
 class Kernel:
