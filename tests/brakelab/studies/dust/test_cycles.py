@@ -19,7 +19,8 @@ def driven(particles: float, work: float = 4e6, mass: float = 2e9) -> CycleDrive
     every = np.full(4, 0.25)
     return CycleDrive(
         1e5, particles * every, 8.0 * every, work * every, 2e6, 1.6e6,
-        np.array([90.0, 95.0, 110.0, 105.0]), -0.01, (0.012, 0.008), 0.0, 0.07, mass, 30.0, 1e6 * 0.5 * 8.0 / 1e5,
+        np.array([90.0, 95.0, 110.0, 105.0]), -0.01,
+        (0.012, 0.008), 0.0, 0.07, mass, 30.0, 1e6 * 0.5 * 8.0 / 1e5,
     )  # fmt: skip
 
 
