@@ -108,8 +108,8 @@ def dust_tables(draws: list[Draw], quiet: list[Draw], cars: list[OnBoard]) -> li
             f"within ±{GOAL_MEDIAN:.0f} % in the median, ±{GOAL_WORST:.0f} % at worst. Last row: what is "
             "left to the law itself, its level known from trips 1 to 7; a model may fall on either side of "
             "it, as applications scatter by a factor of e^0.45, days by e^0.10 (standard deviations). Beside "
-            "that law: against what it says of trip 8 instead of what was counted. Chosen: by trips left out, "
-            "of those that run on board. "
+            "that law: against what it says of trip 8 instead of what was counted. Chosen: by trips left "
+            "out, of those that run on board. "
             f"Counted is {np.median(missed):+.1f} % of what was emitted (some settles in the tunnel); "
             f"{known:.1f} % of the work of trip 8 was within what was trained on.",
         ),
