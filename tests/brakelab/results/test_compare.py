@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -128,3 +129,14 @@ def test_a_page_replaces_no_result(results, tmp_path, capsys, out: str, words: s
     assert cli.main(["compare", str(joint), str(other), "--out", str(tmp_path / out if out else joint)]) == 2
     assert words in capsys.readouterr().err
     assert joint.read_bytes() == before
+
+
+def test_true_values_are_compared_without_faults_or_modes(tmp_path, capsys) -> None:
+    t = np.arange(0.0, 1.0, 0.01)
+    paths = [tmp_path / f"{name}.truth.parquet" for name in ("a", "b")]
+    for path, friction in zip(paths, (0.40, 0.42), strict=True):
+        pq.write_table(pa.table({"t": t, "mu_b_fl": np.full(len(t), friction)}), path)
+    page = tmp_path / "both.html"
+    assert cli.main(["compare", *map(str, paths), "--out", str(page)]) == 1
+    assert "rows: 1 columns differ" in capsys.readouterr().out
+    assert "mu_b_fl" in page.read_text("utf-8")

@@ -29,8 +29,8 @@ from brakelab.fleet.wear import Due, pads_due
 from brakelab.report.look import ESTIMATE, SHADE, new_figure
 from brakelab.report.page import Tile, fill, fixed
 from brakelab.results import euro7
+from brakelab.results.outputs import write_text
 from ecu import __version__
-from ecu.errors import UserError
 
 ROWS: Final = 200
 """Of each table; `drives.parquet` has them all."""
@@ -73,10 +73,7 @@ def write_page(done: Sequence[Summary], out: Path) -> None:
         },
         files("brakelab.fleet") / "fleet.html.j2",
     )
-    try:
-        out.write_text(page, "utf-8")
-    except OSError as error:
-        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
+    write_text(out, page)
 
 
 def _page_of(folder: Path, row: Summary) -> str:

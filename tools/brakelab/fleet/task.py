@@ -22,7 +22,6 @@ from brakelab.replay.drive import replay_drive
 from brakelab.replay.log import log_hash
 from brakelab.replay.needed import NEEDED, fault_lines, needed_lines, nothing_usable, transducer_line
 from brakelab.replay.quality import quality_lines
-from brakelab.report.command import report
 from brakelab.results.car import KEY as CAR
 from brakelab.results.car import car_of
 from brakelab.results.files import ResultWriter, brakes_table
@@ -120,6 +119,8 @@ def _replay(job: Job, paths: Sequence[Path]) -> tuple[Outcome, pa.Table]:
 
 
 def _draw_page(rows: Path, target: Path) -> None:
+    from brakelab.report.command import report  # Bokeh, which no other drive needs
+
     page = rows.with_suffix(".html")
     try:
         report(rows, None, page)

@@ -65,16 +65,15 @@ def _judged_tiles(a: Judged, b: Judged) -> list[Tile]:
 def _over_time(rows: Part) -> dict[str, Any]:
     """Return figures of speed, friction and what differs most, each of A and B, over one time axis."""
     t, both = rows.before["t"], set(rows.before) & set(rows.after)
-    names = [*dict.fromkeys([*_ALWAYS, *(row.name for row in rows.worst() if row.name not in WORDS)])][
-        :_PLOTS
-    ]
+    differing = (row.name for row in rows.worst() if row.name not in WORDS)
+    names = [name for name in dict.fromkeys([*_ALWAYS, *differing]) if name in both][:_PLOTS]
     grid = buckets(np.nan_to_num(rows.before["braking"]) > 0.5 if "braking" in both else t < t[0], POINTS)
     span = Range1d(start=float(t[0]), end=float(t[-1]), bounds="auto")
-    plots = {}
+    at, plots = times(grid, t), {}
     for name in names:
         lines = {"A": rows.before[name], "B": rows.after[name]}
         drawn = {side: extremes(grid, values).astype("f4") for side, values in lines.items()}
-        source = ColumnDataSource({"t": times(grid, t), **drawn})
+        source = ColumnDataSource({"t": at, **drawn})
         plot = new_figure(TIME, f"{name} [{rows.units.get(name, '')}]", x_range=span, window_axis="x")
         draw_line(plot, source, "A", "A", LEFT, line_width=2.2)
         draw_line(plot, source, "B", "B", RIGHT, line_width=1.2)

@@ -248,8 +248,10 @@ def _faults(rows: Part) -> tuple[list[str], list[str]]:
 
 def _seen(columns: Columns) -> int:
     """Return the mask of every fault since the ECU has started."""
-    words = {word: columns.get(word, np.full(len(columns["t"]), np.nan)) for word in WORDS}
-    return int(np.bitwise_or.reduce(np.where(columns["mode"] == STARTING, 0, fault_mask(words))))
+    unknown = np.full(len(columns["t"]), np.nan)
+    words = {word: columns.get(word, unknown) for word in WORDS}
+    starting = columns.get("mode", unknown) == STARTING
+    return int(np.bitwise_or.reduce(np.where(starting, 0, fault_mask(words))))
 
 
 def _part(title: str, one: Result, other: Result, keys: Callable[[Columns], NDArray[np.int64]]) -> Part:
