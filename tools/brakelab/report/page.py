@@ -18,8 +18,14 @@ from brakelab.results.outputs import check_outputs
 from ecu.errors import UserError
 
 PAGE: Final[Traversable] = files("brakelab.report") / "page.html.j2"
-PARTS: Final = ("brakings_table.html.j2", "brakes_section.html.j2", "wear_section.html.j2")
-"""Sections that pages include."""
+PARTS: Final = (
+    "frame.html.j2",
+    "figures.html.j2",
+    "brakings_table.html.j2",
+    "brakes_section.html.j2",
+    "wear_section.html.j2",
+)
+"""What pages extend, import and include."""
 _NONE = "–"
 
 
