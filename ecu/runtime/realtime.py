@@ -4,8 +4,10 @@ import ctypes
 import errno
 import gc
 import os
+import re
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Final, NamedTuple
 
 import structlog
@@ -14,7 +16,13 @@ from ecu.errors import UserError
 from ecu.recording.ring import living_rings, ring_path
 
 PRIORITY: Final = 50  # of SCHED_FIFO: the priority that Linux gives its interrupt threads
-_MCL_CURRENT, _MCL_FUTURE = 1, 2
+_MCL_FUTURE, _MLOCK_ONFAULT = 2, 1
+_NEVER_CALLED: Final = ("openblas", "gfortran", "quadmath", "libcrypto", "libssl", "libsqlite")
+"""Of the names of libraries that a library brings along and the loop never calls."""
+_MAPPING: Final = re.compile(
+    rb"^([0-9a-f]+)-([0-9a-f]+) (\S+) \S+ \S+ \S+ *(.*)\n(?:.*\n){3}Rss: +(\d+)", re.MULTILINE
+)
+"""Of /proc/self/smaps: first address, end, rights, path, kB that were touched."""
 
 
 class Verdict(NamedTuple):
@@ -30,9 +38,21 @@ def _fifo(priority: int) -> None:
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
 
 
-def _lock_memory(which: int = _MCL_CURRENT | _MCL_FUTURE) -> None:
+def _lock_memory() -> None:
+    """Load and lock what is mapped from files, lock what was touched of the rest and what is mapped later.
+
+    A free page of the heap is locked when it is first used: it comes from memory, never from the disk.
+    Left out: libraries that the loop never calls, buffers that nothing has touched.
+    """
     libc = ctypes.CDLL(None, use_errno=True)
-    if libc.mlockall(which) != 0:
+    refused = libc.mlockall(_MCL_FUTURE)
+    for begin, end, rights, path, touched in _MAPPING.findall(Path("/proc/self/smaps").read_bytes()):
+        if int(touched) and not any(name in os.fsdecode(path) for name in _NEVER_CALLED):
+            first, last = int(begin, 16), int(end, 16)
+            free = rights == b"rw-p" and not path.startswith(b"/")
+            how = _MLOCK_ONFAULT if free else 0
+            refused = refused or libc.mlock2(ctypes.c_void_p(first), ctypes.c_size_t(last - first), how)
+    if refused:
         number = ctypes.get_errno()
         raise OSError(number, os.strerror(number))
 
@@ -88,7 +108,7 @@ def check_cpu(cpu: int | None) -> None:
 
 
 def freeze_memory() -> None:
-    """Freeze live objects, disable garbage collection, load all memory pages: after the warm-up.
+    """Freeze live objects, disable garbage collection, load the memory pages of the loop: after the warm-up.
 
     Pages that the kernel has evicted are read from the disk, which can take a second.
     """
@@ -96,7 +116,7 @@ def freeze_memory() -> None:
     gc.freeze()
     gc.disable()
     with suppress(OSError, AttributeError):  # `make_realtime` asks again and judges
-        _lock_memory(_MCL_CURRENT)
+        _lock_memory()
 
 
 def make_realtime(cpu: int | None = None, priority: int = PRIORITY) -> list[Verdict]:

@@ -1,5 +1,7 @@
 import gc
 import os
+import subprocess
+import sys
 from contextlib import contextmanager
 
 import pytest
@@ -65,6 +67,35 @@ def test_a_cpu_that_is_not_there_is_named_at_once(monkeypatch):
     realtime.check_cpu(2)
     with pytest.raises(UserError, match="--cpu: 3: choose 0, 1, 2"):
         realtime.check_cpu(3)
+
+
+LOCKING = """
+import mmap, re
+import numpy
+from ecu.runtime.realtime import make_realtime
+
+untouched = mmap.mmap(-1, 1 << 28, mmap.MAP_PRIVATE)
+print({verdict.name: verdict.granted for verdict in make_realtime()}["mlockall"])
+print(re.search(r"VmRSS:\\s+(\\d+)", open("/proc/self/status").read())[1])
+for name in ("_multiarray_umath", "openblas"):
+    parts = [part for part in re.split(r"\\n(?=[0-9a-f]+-)", open("/proc/self/smaps").read()) if name in part]
+    print(*(sum(int(re.search(rf"^{field}: +(\\d+)", part, re.M)[1]) for part in parts if "r-xp" in part)
+          for field in ("Size", "Rss", "Locked")))
+"""
+
+
+def test_what_the_loop_never_calls_and_what_nothing_touched_is_not_locked():
+    out = subprocess.run(
+        [sys.executable, "-c", LOCKING], capture_output=True, text=True, timeout=60, check=True
+    )
+    granted, resident, code, algebra = out.stdout.splitlines()
+    if granted != "True":
+        pytest.skip("this user may not lock memory")
+    size, loaded, locked = map(int, code.split())
+    assert loaded == size
+    assert locked > 0
+    assert algebra.endswith(" 0")
+    assert int(resident) < 100_000
 
 
 def test_a_daemon_sees_the_others_of_its_user(monkeypatch, tmp_path):
