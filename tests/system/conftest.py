@@ -17,6 +17,7 @@ import pytest
 
 from brakelab.simulation.priority import PRIORITY
 from brakelab.testing.daemon import Daemon, patience, wait_for
+from brakelab.testing.xcp_master import Master, Wire
 from ecu.bus.channel import open_channel
 from ecu.bus.protocol import Channel
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit
@@ -24,8 +25,6 @@ from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import INPUT, N_INPUTS
 from ecu.recording.recorder import read_recording
 from ecu.runtime.clock import Grid, system_time
-
-from .xcp_master import Master, Wire
 
 ROOT = Path(__file__).parents[2]
 DBC = ROOT / "dbc" / "brake_ecu.dbc"

@@ -11,6 +11,7 @@ import pytest
 
 from brakelab.replay.command import replay
 from brakelab.testing.daemon import wait_for
+from brakelab.testing.xcp_master import VARIABLES, CanWire, Master, Refused
 from ecu.bus.channel import open_bus
 from ecu.contract.records import output_vector
 from ecu.contract.signals import OUTPUT_COLUMNS
@@ -18,7 +19,6 @@ from ecu.recording.recorder import read_recording
 from ecu.settings.config import load_config
 
 from .conftest import ROOT, free_port, process_of, unharmed
-from .xcp_master import VARIABLES, CanWire, Master, Refused
 
 pytestmark = pytest.mark.multicast
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from brakelab.testing.daemon import wait_for
+from brakelab.testing.xcp_master import VARIABLES
 from ecu.settings.config import load_config
 from ecu.xcp.memory import EPK
 
 from .conftest import ROOT, driven, free_port
 from .test_xcp_udp import GROUP, SIGNALS
-from .xcp_master import VARIABLES
 
 pyxcp = pytest.importorskip("pyxcp", reason="pyxcp is not installed: pip install pyxcp")
 

@@ -4,12 +4,12 @@ import time
 
 import pytest
 
+from brakelab.testing.xcp_master import VARIABLES, CanWire, Master
 from ecu.bus.channel import open_bus
 from ecu.recording.recorder import read_recording
 
 from .conftest import ROOT, driven
 from .test_xcp_calibration import SECRET, same_bits
-from .xcp_master import VARIABLES, CanWire, Master
 
 pytestmark = pytest.mark.socketcan
 

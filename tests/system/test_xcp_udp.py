@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from brakelab.testing.daemon import wait_for
+from brakelab.testing.xcp_master import VARIABLES, CanWire, Master, Refused, Wire
 from ecu.bus.channel import open_bus
 from ecu.contract.records import output_vector
 from ecu.contract.signals import OUTPUT_COLUMNS
@@ -19,7 +20,6 @@ from ecu.xcp.a2l import a2l_text
 from ecu.xcp.memory import EPK
 
 from .conftest import ROOT, free_port, process_of, unharmed
-from .xcp_master import VARIABLES, CanWire, Master, Refused, Wire
 
 pytestmark = pytest.mark.multicast
 

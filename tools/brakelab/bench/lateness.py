@@ -2,7 +2,7 @@
 
 Daemon and simulated vehicle are processes on a bus of their own. Beside them, on the daemon's own core and
 above its priority, a bare loop wakes every 10 ms and does nothing: the floor of this machine.
-The daemon serves metrics; every other five seconds it is watched, by two clients, and scraped.
+Its services are asked in turns of five seconds, with one of nothing.
 """
 
 import json
@@ -17,7 +17,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.bench.watchers import BLOCK_S, PORTS, VIEWERS, Block, Watchers, alternate, inside
+from brakelab.bench.services import (
+    BLOCK_S,
+    NOTHING,
+    OPTIONS,
+    Block,
+    Service,
+    alternate,
+    inside,
+    seconds_beside,
+    start_services,
+)
 from brakelab.results.text_table import Table
 from brakelab.results.verdict import Goal, verdict
 from brakelab.rig.live import Processes, choose_bus
@@ -51,9 +61,9 @@ class Lateness(NamedTuple):
     t_ns: NDArray[np.int64]
     """Deadlines on the monotonic clock [ns]."""
     blocks: list[Block]
-    """With watchers and without, in turns."""
-    messages: float
-    """That each viewer of the page got, a second."""
+    """Beside nothing and each service, in turns."""
+    answers: dict[str, int]
+    """Of each service."""
     bus: str
     busy: int
     """Processes that kept the cores busy."""
@@ -84,11 +94,12 @@ def measure(seconds: float) -> Lateness:
         out, stop = Path(folder), Path(folder) / "stop"
         with (out / "daemon.log").open("wb") as log:
             processes = Processes(bus, resource("config/suv.toml"), out, log)
-            bare = watchers = None
+            bare = None
+            services: dict[str, Service] = {}
             try:
                 processes.start_vehicle(resource(SCENARIO), SEED)
-                processes.start_daemon("drive", "--metrics-port", str(PORTS[1]))
-                watchers = Watchers(processes.daemons[-1].pid)
+                processes.start_daemon("drive", *OPTIONS)
+                services = start_services(processes.daemons[-1].pid, bus)
                 processes.departure()
                 busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in os.sched_getaffinity(0)]
                 bare = subprocess.Popen(
@@ -97,12 +108,12 @@ def measure(seconds: float) -> Lateness:
                     text=True,
                 )
                 time.sleep(SETTLING_S)
-                blocks = alternate(watchers, seconds, processes.driving)
+                blocks = alternate(services, seconds, processes.driving)
                 stop.touch()
                 floor = np.array(json.loads(bare.communicate()[0]), np.float64)
             finally:
-                if watchers is not None:
-                    watchers.end()
+                for service in services.values():
+                    service.end()
                 others: list[subprocess.Popen[Any]] = [*busy, *([bare] if bare else [])]
                 for process in others:
                     process.kill()
@@ -119,7 +130,7 @@ def measure(seconds: float) -> Lateness:
         int(cycles["missed"].sum()),
         cycles["t_mono_ns"],
         blocks,
-        watchers.messages_a_second(blocks),
+        {name: service.answers for name, service in services.items()},
         bus.why,
         len(busy),
     )
@@ -140,17 +151,21 @@ def lateness_tables(seconds: float) -> list[Table]:
         row("daemon's cycle begins", found.woken, f"p99.9 ≤ {LATEST_US:.0f}", begins),
         row("daemon's cycle ends", found.ended, f"≤ {1e-3 * CYCLE_NS:.0f}", ends),
         *(
-            row(f"begins, {'watched' if watched else 'not watched'}", found.woken[chosen], "–")
-            for watched in (False, True)
-            if (chosen := inside(found.blocks, found.t_ns, watched)).any()
+            row(f"begins, beside {service}", found.woken[chosen], "–")
+            for service in dict.fromkeys(block.beside for block in found.blocks)
+            if (chosen := inside(found.blocks, found.t_ns, service)).any()
         ),
     ]
+    rates = ", ".join(
+        f"{name} {count / seconds_beside(found.blocks, name):.1f}"
+        for name, count in found.answers.items()
+        if seconds_beside(found.blocks, name)
+    )
     below = (
         f"µs after the deadline, {len(found.woken)} cycles of 10 ms on {found.bus}, {found.busy} other "
         f"processes busy on as many cores. {found.missed} periods missed, {late_ends} cycles ended after the "
-        f"next deadline. Watched: every other {BLOCK_S:g} s by `watch --json` and `watch --web` "
-        f"with {VIEWERS} viewers, {found.messages:.1f} messages a second each, and scraped every second; "
-        "else these and the process of the metrics stand still."
+        f"next deadline. Services are asked in turns of {BLOCK_S:g} s, {NOTHING} is one of them; those that "
+        f"are not asked stand still, or wait. Answers a second: {rates}."
     )
     return [Table("lateness", ("what", "p50", "p99", "p99.9", "worst", "goal", "verdict"), rows, below)]
 

@@ -1,21 +1,44 @@
-"""A small XCP master of the tests' own, by the standard alone: UDP, TCP or CAN; what it measures it keeps."""
+"""A small XCP master, by the standard alone: UDP, TCP or CAN; what it measures it keeps."""
 
 import hmac
 import socket
 import struct
 import time
+from collections.abc import Sequence
+from typing import Any, Final, Protocol
 
 import can
 
 from brakelab.testing.daemon import wait_for
 from ecu.xcp.variables import RECORDS
 
-HEADER = struct.Struct("<HH")
-VARIABLES = {
+HEADER: Final = struct.Struct("<HH")
+VARIABLES: Final = {
     f"{record.name}.{one.name}": (record.base + one.offset, one)
     for record in RECORDS
     for one in record.variables
 }
+"""Address of each variable, and the variable."""
+AT_ONCE: Final = 150
+"""Numbers of eight bytes in a packet."""
+
+
+class Transport(Protocol):
+    """Carries packets both ways."""
+
+    lost: int
+
+    def open(self) -> None:
+        """Open it, as soon as there is somebody."""
+
+    def send(self, packet: bytes) -> None:
+        """Send a packet."""
+
+    def receive(self) -> bytes:
+        """Return the next packet. Raises TimeoutError if none comes."""
+
+    def close(self) -> None:
+        """Close it."""
 
 
 class Refused(Exception):
@@ -25,16 +48,17 @@ class Refused(Exception):
 class Wire:
     """UDP or TCP; checks the counter of what comes."""
 
-    def __init__(self, kind, port):
+    def __init__(self, kind: str, port: int) -> None:
         self.stream, self.port = kind == "tcp", port
         self.open()
 
-    def open(self):
+    def open(self) -> None:
         """Open it, as soon as there is somebody."""
-        self.data, self.counter, self.lost = b"", None, 0
+        self.data, self.lost = b"", 0
+        self.counter: int | None = None
         wait_for(self._opens)
 
-    def _opens(self):
+    def _opens(self) -> bool:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM if self.stream else socket.SOCK_DGRAM)
         self.socket.settimeout(2.0)
         if not self.stream:
@@ -46,10 +70,12 @@ class Wire:
             return False
         return True
 
-    def send(self, packet):
+    def send(self, packet: bytes) -> None:
+        """Send a packet."""
         self.socket.send(HEADER.pack(len(packet), 0) + packet)
 
-    def receive(self):
+    def receive(self) -> bytes:
+        """Return the next packet. Raises OSError if none comes."""
         while True:
             if len(self.data) >= HEADER.size:
                 length, counter = HEADER.unpack_from(self.data)
@@ -65,7 +91,8 @@ class Wire:
                 raise ConnectionResetError("the slave hung up")
             self.data = self.data + found if self.stream else found
 
-    def close(self):
+    def close(self) -> None:
+        """Close it."""
         self.socket.close()
 
 
@@ -74,13 +101,15 @@ class CanWire:
 
     lost = 0
 
-    def __init__(self, bus, request, response):
+    def __init__(self, bus: can.BusABC, request: int, response: int) -> None:
         self.bus, self.request, self.response = bus, request, response
 
-    def send(self, packet):
+    def send(self, packet: bytes) -> None:
+        """Send a packet."""
         self.bus.send(can.Message(arbitration_id=self.request, is_extended_id=False, data=packet))
 
-    def receive(self):
+    def receive(self) -> bytes:
+        """Return the next packet. Raises OSError if none comes."""
         end = time.monotonic() + 2.0
         while time.monotonic() < end:
             frame = self.bus.recv(0.1)
@@ -88,17 +117,20 @@ class CanWire:
                 return bytes(frame.data)
         raise TimeoutError("no answer")
 
-    def close(self):
+    def close(self) -> None:
+        """Close it."""
         self.bus.shutdown()
 
 
 class Master:
     """Asks one question at a time; packets of lists that come meanwhile are kept in `packets`."""
 
-    def __init__(self, wire):
-        self.wire, self.packets, self.events = wire, [], []
+    def __init__(self, wire: Transport) -> None:
+        self.wire = wire
+        self.packets: list[bytes] = []
+        self.events: list[bytes] = []
 
-    def ask(self, layout, *values):
+    def ask(self, layout: str, *values: Any) -> bytes:
         """Send a command, packed; return what follows the first byte of the response."""
         self.wire.send(struct.pack(f"<{layout}", *values))
         while (packet := self.take())[0] < 0xFE:
@@ -107,7 +139,7 @@ class Master:
             raise Refused(packet[1])
         return packet[1:]
 
-    def take(self):
+    def take(self) -> bytes:
         """Return the next packet, kept where it is no response."""
         packet = self.wire.receive()
         if packet[0] == 0xFD:
@@ -116,10 +148,10 @@ class Master:
             self.packets.append(packet)
         return packet
 
-    def connect(self):
+    def connect(self) -> "Master":
         """Connect as soon as there is an answer: the slave begins after the loop."""
 
-        def answered():
+        def answered() -> bool:
             try:
                 return bool(self.ask("BB", 0xFF, 0))
             except TimeoutError:
@@ -132,18 +164,19 @@ class Master:
         wait_for(answered)
         return self
 
-    def upload(self, address, length):
+    def upload(self, address: int, length: int) -> bytes:
+        """Return bytes from an address."""
         return self.ask("BBBBL", 0xF4, length, 0, 0, address)
 
-    def value(self, name):
+    def value(self, name: str) -> Any:
         """Return a variable as it is now."""
         address, one = VARIABLES[name]
         return struct.unpack(f"<{one.kind.char}", self.upload(address, one.kind.itemsize))[0]
 
-    def unlock(self, secret, most=246):
+    def unlock(self, secret: bytes, most: int = 246) -> None:
         """Get access to calibration: the key is the first 16 bytes of HMAC-SHA-256 over the seed."""
-        left, *seed = self.ask("BBB", 0xF8, 0, 1)
-        seed = bytes(seed)
+        answer = self.ask("BBB", 0xF8, 0, 1)
+        left, seed = answer[0], answer[1:]
         while len(seed) < left:
             seed += self.ask("BBB", 0xF8, 1, 1)[1:]
         key = hmac.digest(secret, seed, "sha256")[:16]
@@ -152,7 +185,7 @@ class Master:
             protected = self.ask(f"BB{len(part)}s", 0xF7, len(key) - at, part)
         assert protected == b"\x00"
 
-    def download(self, name, *values, most=246):
+    def download(self, name: str, *values: float, most: int = 246) -> None:
         """Write a variable of the working page, in as many pieces as it takes."""
         address, one = VARIABLES[name]
         self.ask("BHBL", 0xF6, 0, 0, address)
@@ -161,11 +194,11 @@ class Master:
             part = data[at : at + most]
             self.ask(f"BB{len(part)}s", 0xF0, len(part), part)
 
-    def take_over(self, page=1):
+    def take_over(self, page: int = 1) -> None:
         """Have the ECU go by a page."""
         self.ask("BBBB", 0xEB, 1, 0, page)
 
-    def begin(self, odts, stamp=True):
+    def begin(self, odts: Sequence[Sequence[tuple[int, int]]], stamp: bool = True) -> None:
         """Set up list 0 with entries (address, length) of each packet, and start it."""
         self.ask("B", 0xD6)
         self.ask("BBH", 0xD5, 0, 1)
@@ -177,17 +210,31 @@ class Master:
             for address, length in entries:
                 self.ask("BBBBL", 0xE1, 0xFF, length, 0, address)
         self.ask("BBHHBB", 0xE0, 0x10 if stamp else 0, 0, 0, 1, 0)
+        self.start()
+
+    def start(self) -> None:
+        """Start list 0."""
         self.ask("BBH", 0xDE, 2, 0)
         self.ask("BB", 0xDD, 1)
 
-    def measure(self, names, packets):
-        """Measure variables of eight bytes until so many packets have come; stop; return stamps and rows."""
-        odts = [names[at : at + 150] for at in range(0, len(names), 150)]
-        self.begin([[(VARIABLES[name][0], 8) for name in odt] for odt in odts])
-        while len(self.packets) < packets * len(odts):
-            self.take()
+    def stop(self) -> None:
+        """Stop all lists."""
         self.ask("BB", 0xDD, 0)
-        rows, stamps = [], []
+
+    def begin_numbers(self, names: Sequence[str]) -> int:
+        """Set up list 0 with variables of eight bytes, and start it; return how many packets a cycle has."""
+        odts = [names[at : at + AT_ONCE] for at in range(0, len(names), AT_ONCE)]
+        self.begin([[(VARIABLES[name][0], 8) for name in odt] for odt in odts])
+        return len(odts)
+
+    def measure(self, names: Sequence[str], packets: int) -> tuple[list[int], list[bytes]]:
+        """Measure variables of eight bytes until so many packets have come; stop; return stamps and rows."""
+        parts = self.begin_numbers(names)
+        while len(self.packets) < packets * parts:
+            self.take()
+        self.stop()
+        rows: list[bytes] = []
+        stamps: list[int] = []
         for packet in self.packets:
             if packet[0] == 0:
                 stamps.append(struct.unpack_from("<L", packet, 1)[0])
@@ -197,5 +244,6 @@ class Master:
                 rows[-1] += packet[1:]
         return stamps, rows
 
-    def close(self):
+    def close(self) -> None:
+        """Close it."""
         self.wire.close()
