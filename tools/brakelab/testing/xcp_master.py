@@ -24,7 +24,7 @@ AT_ONCE: Final = 150
 
 
 class Transport(Protocol):
-    """Carries packets both ways."""
+    """Carries packets in both directions."""
 
     lost: int
 
