@@ -26,6 +26,24 @@ def test_without_its_effects_the_law_counts_work():
         assert emission_rate(PLAIN, power, speed, 300.0) == pytest.approx(counted * power)
 
 
+VAPOUR = LAW.model_copy(update={"activation": 12e3, "flash": 0.0})
+COARSE = VAPOUR.rate * share_counted(LAW.coarse_median, LAW.coarse_spread)
+ULTRAFINE = VAPOUR.rate * LAW.hot * share_counted(LAW.ultrafine_median, LAW.ultrafine_spread)
+SECOND_FORM = {  # power [W], sliding [m/s], disc [degC] -> particles per J
+    "cold, at reference force: abrasion alone": ((5e3, 5.0, -200.0), COARSE),
+    "force x 8 at equal power": ((5e3, 0.625, -200.0), COARSE * 8.0**LAW.by_power),
+    "power and speed x 2: the same force": ((10e3, 10.0, -200.0), COARSE),
+    "at the critical temperature": ((5e3, 5.0, 185.0), COARSE + 0.5 * ULTRAFINE),
+    "20 K below": ((5e3, 5.0, 165.0), COARSE + 0.5 * ULTRAFINE * np.exp(-12e3 * 20.0 / (458.15 * 438.15))),
+    "far above: what the lining holds": ((5e3, 5.0, 400.0), COARSE + ULTRAFINE),
+}
+
+
+@pytest.mark.parametrize(("at", "per_joule"), SECOND_FORM.values(), ids=SECOND_FORM)
+def test_the_second_form_adds_abrasion_by_force_and_vapours(at, per_joule):
+    assert emission_rate(np.array(VAPOUR.row()), *at) == pytest.approx(per_joule * at[0])
+
+
 # power [W], speed of sliding [m/s], disc [degC] of the one that emits more, and of the other; which effect
 MORE = {
     "(i) more friction power, per joule too": ((2e4, 5.0, 80.0), (1e4, 5.0, 80.0), 2.0),

@@ -8,6 +8,11 @@ The number of particles of one brake grows by
     m' = P / W_m (1 / (1 + exp(-(tau_c - tau_m) / w)) - m)      treated the surface, over the work W_m
     tau_c = tau + f P                             the contact is hotter than the disc
 
+or, where an activation E is given, by a second form, in which abrasion and vapours do not share a factor,
+
+    N' = k P (e_c (F / F_r)^n_P + e_u / 2 min(exp(E (1 / T_u - 1 / T_c)), 2)) C     F = P / v
+
+of the contact's temperature T_c and tau_u's T_u in kelvin: vapours by Arrhenius up to what the lining holds;
 with the friction power P = T_b |omega| (i) and the sliding speed v = r_eff |omega| (ii); pressure acts
 through P alone (iii). The count covers 23 nm to 2.5 um: e_c of the coarse and e_u of the
 ultrafine particles, both log-normal in diameter. Beside it the number scatters from application to
@@ -27,9 +32,11 @@ REFERENCE_POWER: Final = 5e3  # W
 REFERENCE_SPEED: Final = 5.0  # m/s, of sliding
 SMALLEST_PARTICLE: Final = 23e-9  # m, counted from here
 LARGEST_PARTICLE: Final = 2.5e-6  # m, to here
-EMISSION_ROW: Final = 13
+ZERO_CELSIUS: Final = 273.15  # K
+HELD: Final = 2.0  # of vapours, over those at the critical temperature
+EMISSION_ROW: Final = 14
 (RATE, BY_POWER, BY_SPEED, COARSE, ULTRAFINE, HOT_FROM, HOT_WIDTH, FLASH, RUN_IN, RUN_IN_WORK, TREATED,
- TREATED_FROM, TREATED_WORK) = range(EMISSION_ROW)  # fmt: skip
+ TREATED_FROM, TREATED_WORK, ACTIVATION) = range(EMISSION_ROW)  # fmt: skip
 
 
 def share_counted(median: float, spread: float) -> float:
@@ -63,6 +70,8 @@ class EmissionLaw(Section):
     treated: NotNegative = 0.5
     treated_from: Positive = 160.0  # degC
     treated_work: Positive = 4e6  # J
+    activation: NotNegative = 0.0
+    """K, activation energy of vapours over the gas constant; 0: the first form."""
 
     def row(self) -> tuple[float, ...]:
         """Return the law's numbers for its kernel."""
@@ -70,7 +79,7 @@ class EmissionLaw(Section):
         ultrafine = self.hot * share_counted(self.ultrafine_median, self.ultrafine_spread)
         shape = (self.rate, self.by_power, self.by_speed, coarse, ultrafine, self.hot_from, self.hot_width)
         before = (self.run_in, self.run_in_work, self.treated, self.treated_from, self.treated_work)
-        return (*shape, self.flash, *before)
+        return (*shape, self.flash, *before, self.activation)
 
 
 @kernel
@@ -82,6 +91,11 @@ def emission_rate(row: Record, power: float, speed: float, heat: float) -> float
     if power <= 0.0 or speed <= 0.0:
         return 0.0
     contact = heat + row[FLASH] * power
+    if row[ACTIVATION] > 0.0:
+        inverse = 1.0 / (row[HOT_FROM] + ZERO_CELSIUS) - 1.0 / (contact + ZERO_CELSIUS)
+        vapours = row[ULTRAFINE] / HELD * min(math.exp(row[ACTIVATION] * inverse), HELD)
+        force = power / speed * REFERENCE_SPEED / REFERENCE_POWER
+        return row[RATE] * power * (row[COARSE] * force ** row[BY_POWER] + vapours)
     ultrafine = row[ULTRAFINE] / (1.0 + math.exp(-(contact - row[HOT_FROM]) / row[HOT_WIDTH]))
     shape = (power / REFERENCE_POWER) ** row[BY_POWER] * (speed / REFERENCE_SPEED) ** row[BY_SPEED]
     return row[RATE] * power * shape * (row[COARSE] + ultrafine)
