@@ -54,7 +54,7 @@ def test_what_a_gram_is_worth_is_taken_from_the_blocks(blocks):
     """Pads lose K g/mm: measured, it is the density of the lining on board, whose area is CONFIG's."""
     identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "car.toml")
     page = (blocks / "car.md").read_text()
-    slope = float(page.partition("linear wear K: ")[2].partition(" g/mm")[0])
+    slope = float(page.partition("linear wear K: ")[2].partition(" ± ")[0])
     pad = load_config(blocks / "car.toml").front.pad
     assert 2.0 * pad.density * pad.area == pytest.approx(slope, rel=1e-3)
 

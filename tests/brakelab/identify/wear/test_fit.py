@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from brakelab.identify.wear.command import slope_is_known
 from brakelab.identify.wear.fit import QUASI_STATIC, explains, fit_law, rank_of, strangers
 from brakelab.identify.wear.fusion import BALANCE, POINT, POINTS, disagreeing, fuse, unequal
 from ecu.errors import UserError
@@ -92,6 +93,27 @@ def test_a_law_that_tells_no_block_explains_nothing():
     assert explains(fit_law(x, mass, variance), mass)
     other = mass[::-1] * np.geomspace(0.2, 5.0, len(mass))
     assert not explains(fit_law(x, other, variance), other)
+
+
+# wear of each block [mm] -> whether what a gram is worth is taken from them
+WORN = {"a tenth each": (0.1, True), "a hundredth each": (0.01, False)}
+
+
+@pytest.mark.parametrize(("wear", "known"), WORN.values(), ids=WORN)
+def test_k_is_known_where_enough_was_worn_off(wear: float, known: bool):
+    """Against a thousand programmes of six blocks, 27 g/mm."""
+    random = np.random.default_rng(5)
+    true = wear * np.linspace(0.8, 1.2, 6)
+    made = [
+        fuse(
+            true + POINT * np.sqrt(2.0 / POINTS) * random.standard_normal(6),
+            27.0 * true + np.sqrt(2.0) * BALANCE * random.standard_normal(6),
+        )
+        for _ in range(1000)
+    ]
+    assert np.mean([slope_is_known(one) for one in made]) == pytest.approx(float(known), abs=0.05)
+    if known:
+        assert np.std([one.slope for one in made]) == pytest.approx(made[0].slope_error, rel=0.1)
 
 
 @pytest.mark.parametrize(("grams", "found"), [(0.0, []), (2.0, [3]), (-1.5, [3])])

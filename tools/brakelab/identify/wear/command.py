@@ -19,7 +19,7 @@ from brakelab.identify.wear.fit import (
     leave_one_out,
     strangers,
 )
-from brakelab.identify.wear.fusion import Fused, disagreeing, fuse, unequal
+from brakelab.identify.wear.fusion import SURE, Fused, disagreeing, fuse, unequal
 from brakelab.identify.wear.page import tables, write_page
 from brakelab.identify.wear.reader import Block, read_blocks
 from brakelab.identify.wear.weighings import SIDES
@@ -29,6 +29,7 @@ from ecu.settings.config import Axle
 from ecu.settings.pad import Pad
 
 DENSITIES: Final = (800.0, 6000.0)  # kg/m^3: organic linings 1500 to 2800, sintered ones up to 5500
+KNOWN_SLOPE: Final = 0.15  # relative standard deviation: above, the density of CONFIG is as good
 ROAD: Final = 0.20  # relative: what a brake wears on the road beside a dynamometer (7.20, 7.21; +20 %)
 
 
@@ -37,17 +38,24 @@ def law_error(fit: Fit, mass: Array) -> float:
     return float(np.linalg.norm([leave_one_out(fit, mass), fit.elsewhere, ROAD]))
 
 
-def law_section(fit: Fit, error: float, pad: Pad, slope: float) -> Section:
-    """Return the keys of a pad: its law, the law's `error`, relative, and the density by `slope` [g/mm].
+def slope_is_known(fused: Fused) -> bool:
+    """Return whether K is surer than the density of a configuration."""
+    return fused.slope_error < KNOWN_SLOPE * fused.slope
+
+
+def law_section(fit: Fit, error: float, pad: Pad, fused: Fused) -> Section:
+    """Return the keys of a pad: its law, the law's `error`, relative, and the density by K where it is known.
 
     Raises:
-        UserError: the slope cannot be that of a lining of this area.
+        UserError: K cannot be that of a lining of this area.
     """
     numbers = ", ".join(f"{value:.6g}" for value in fit.coefficients)
     measured: Section = {}
-    if np.isfinite(slope):
+    if slope_is_known(fused):
+        slope = fused.slope
         density = 0.5 * slope / pad.area  # kg/m is g/mm
-        if not DENSITIES[0] < density < DENSITIES[1]:
+        within = 1.0 + SURE * fused.slope_error / slope
+        if not DENSITIES[0] / within < density < DENSITIES[1] * within:
             remedy = (
                 f"pads lose {slope:.3g} g/mm, {density:.3g} kg/m^3 by an area of {pad.area:g} m^2: "
                 "give masses in g, thickness in mm, and the pad's area in CONFIG"
@@ -136,7 +144,7 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path, columns: P
                 f"{manifest}: no law explains these blocks better than their mean (R² {fit.r2:.2f}, left out "
                 f"{100 * leave_one_out(fit, fused.mass):.0f} % RMS); check masses and the units of all files"
             )
-        section = law_section(fit, law_error(fit, fused.mass), brake.pad, fused.slope)
+        section = law_section(fit, law_error(fit, fused.mass), brake.pad, fused)
     except UserError as error:
         raise UserError(
             str(manifest), ": ".join(filter(None, (error.where, error.place))), error.remedy
@@ -146,6 +154,11 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path, columns: P
     write_page(page, blocks, fused, fit, static, SHARE[axle] * vehicle.vehicle.mass)
     named = zip(TERMS, fit.coefficients, UNITS, strict=True)
     kept = ", ".join(f"{name} = {value:.4g} {unit}" for name, value, unit in named if value)
+    if np.isfinite(fused.slope) and not slope_is_known(fused):
+        say(
+            f"{manifest}: pads lose {fused.slope:.3g} ± {fused.slope_error:.2g} g/mm: too little was worn "
+            "off to measure it; the density stays that of CONFIG"
+        )
     give(coefficients=dict(zip(TERMS, fit.coefficients, strict=True)), r2=fit.r2)
     give(left_out=leave_one_out(fit, fused.mass), tables=tables(blocks, fused, fit, static))
     for one in (block.reproduced for block in blocks):

@@ -6,6 +6,7 @@ alpha = (sigma_y / sigma_x)^2: small where the balance is the more accurate, as 
 has the variance 1 / (1/sigma_y^2 + 1/(K sigma_x)^2), K's own beside it, which is the same for all points.
 """
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -27,6 +28,8 @@ class Fused(NamedTuple):
     """g^2, shape (n, n)."""
     slope: float
     """K, g/mm; NaN: no thickness was measured."""
+    slope_error: float
+    """Standard deviation of K, g/mm."""
     alpha: float
 
 
@@ -63,7 +66,7 @@ def fuse(wear: NDArray[np.float64], mass: NDArray[np.float64]) -> Fused:
     own = np.full(len(mass), 2.0 * BALANCE**2)
     known = np.isfinite(wear)
     if np.count_nonzero(known) < 2:
-        return Fused(mass.copy(), np.diag(own), float("nan"), 0.0)
+        return Fused(mass.copy(), np.diag(own), math.nan, math.nan, 0.0)
     x, y = wear[known], mass[known]
     slope = float(x @ y / (x @ x))
     sigma_x, sigma_y = POINT * np.sqrt(2.0 / POINTS), np.sqrt(2.0) * BALANCE
@@ -75,4 +78,5 @@ def fuse(wear: NDArray[np.float64], mass: NDArray[np.float64]) -> Fused:
     share = np.zeros(len(mass))
     share[known] = x * per_slope / (slope + per_slope)  # d fused / d K, the direction held
     of_slope = (sigma_y**2 + (slope * sigma_x) ** 2) / float(x @ x)
-    return Fused(fused, np.diag(variance) + of_slope * np.outer(share, share), slope, float(alpha))
+    covariance = np.diag(variance) + of_slope * np.outer(share, share)
+    return Fused(fused, covariance, slope, math.sqrt(of_slope), float(alpha))

@@ -169,7 +169,9 @@ def tables(blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> list[Tab
         )
         for name, each in (("extended (7.13)", fit), ("quasi-static (7.14)", static))
     ]
-    slope = f"{fused.slope:.2f} g/mm" if np.isfinite(fused.slope) else "not measured"
+    slope = (
+        f"{fused.slope:.2f} ± {fused.slope_error:.2f} g/mm" if np.isfinite(fused.slope) else "not measured"
+    )
     return [
         Table(
             "Law",
