@@ -40,8 +40,19 @@ def trip(delay: float = 2.0, stops: int = 10, noise: float = 0.0, holds: bool = 
     shown *= 1.0 + noise * random.normal(size=len(v))
     return Recorded(
         "a", False, t, v, 15.0 * on + 0.3 * random.normal(size=len(v)), 400.0 * on * (v > 0.0),
-        80.0 + 0.01 * t, shown, np.full(len(v), FLOW),
+        80.0 + 0.01 * t, shown, np.full(len(v), FLOW), np.ones(len(v), bool),
     )  # fmt: skip
+
+
+def test_an_application_that_was_not_counted_is_left_out():
+    whole = trip()
+    start = extract(whole, RADIUS).start[3]
+    lost = np.abs(whole.t - start) < 10.0
+    shown = np.where(lost, 0.0, whole.concentration)
+    found = extract(whole._replace(concentration=shown, counted=~lost), RADIUS)
+    assert (len(found.particles), found.left_out) == (9, 1)
+    assert start not in found.start
+    np.testing.assert_allclose(found.particles, np.delete(extract(whole, RADIUS).particles, 3), rtol=0.05)
 
 
 def test_applications_and_their_conditions():

@@ -21,7 +21,7 @@ import numpy as np
 
 from brakelab.arrays import Array
 from brakelab.identify.dust.features import PERIOD, Recorded, find_applications, find_background
-from brakelab.identify.dust.reader import MOST_COUNT, on_grid, read_trip, trip_columns
+from brakelab.identify.dust.reader import MOST_COUNT, off_count, on_grid, read_trip, trip_columns
 from brakelab.identify.manifest import read_manifest, refuse_row
 from brakelab.identify.measurement_files import read_columns
 from brakelab.simulation.trip.wltp_brake import TRIPS
@@ -115,6 +115,9 @@ def read_run(manifest: Path, config: Config, axle: str, given: Path | None = Non
             raise refuse_row(manifest, line, row, "trip and file")
         path = manifest.parent / row["file"]
         trip = read_trip(path, row["trip"], False, columns)
+        if not trip.counted.all():
+            remedy = f"{off_count(trip)}; the sum needs all of the cycle"
+            raise UserError(str(path), "particle_concentration", remedy)
         reference = manifest.parent / row["reference"] if row.get("reference") else None
         trips.append(_run(path, trip, reference, columns.brake.tyre_radius))
         for name in WHOLE:

@@ -15,6 +15,7 @@ conditions are those of (8.2) and the mean pressure; their emission is (8.1)
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brakelab.arrays import Array
 from brakelab.stretches import stretches
@@ -54,6 +55,8 @@ class Recorded(NamedTuple):
     concentration: Array
     """1/cm^3, linear between the counter's samples"""
     flow: Array
+    counted: NDArray[np.bool_]
+    """False where the counter dropped out"""
 
 
 class Background(NamedTuple):
@@ -96,6 +99,8 @@ class Applications(NamedTuple):
     delay_s: float
     """s of the air from disc to counter"""
     recorded: Recorded | None = None
+    left_out: int = 0
+    """Applications during which the counter dropped out."""
 
     @property
     def factor(self) -> Array:
@@ -133,7 +138,7 @@ def find_background(trip: Recorded, applications: list[tuple[int, int]]) -> Back
     accel = np.gradient(np.convolve(trip.speed, np.full(11, 1 / 11), "same"), PERIOD)
     every = np.zeros(len(trip.t), bool)
     every[:: round(1.0 / PERIOD)] = True
-    clear = every & (since > CLEAR_S) & (np.abs(accel) < STEADY) & (trip.speed > MOVING)
+    clear = every & trip.counted & (since > CLEAR_S) & (np.abs(accel) < STEADY) & (trip.speed > MOVING)
     v, c = trip.speed[clear], trip.concentration[clear]
     bins = np.floor(v / SPEED_BIN).astype(int)
     speeds, levels, counts = [], [], []
@@ -172,7 +177,7 @@ def transport_time(trip: Recorded) -> float:
     """
     power, known = trip.torque * trip.speed, np.column_stack([np.ones(len(trip.t)), trip.speed])
     power = power - known @ np.linalg.lstsq(known, power, rcond=None)[0]
-    shown = trip.concentration - trip.concentration.mean()
+    shown = np.where(trip.counted, trip.concentration - trip.concentration[trip.counted].mean(), 0.0)
     lags = range(min(round(LONGEST_DELAY_S / PERIOD), len(power) - 1))
     means = [float(power[: len(power) - lag] @ shown[lag:]) / (len(power) - lag) for lag in lags]
     best = int(np.argmax(means))
@@ -187,8 +192,8 @@ def aligned(trip: Recorded, delay: float) -> Recorded:
     late = round(delay / PERIOD)
     whole = len(trip.t) - late
     t, speed, pressure, torque, temperature = (column[:whole] for column in trip[2:7])
-    counted, flow = trip.concentration[late:], trip.flow[:whole]
-    return Recorded(trip.name, trip.test, t, speed, pressure, torque, temperature, counted, flow)
+    shown, counted, flow = trip.concentration[late:], trip.counted[late:], trip.flow[:whole]
+    return Recorded(trip.name, trip.test, t, speed, pressure, torque, temperature, shown, flow, counted)
 
 
 def _conditions(trip: Recorded, start: int, end: int) -> tuple[float, ...]:
@@ -212,21 +217,23 @@ def _sequence(trip: Recorded, start: int, end: int) -> Array:
 
 
 def extract(trip: Recorded, radius: float) -> Applications:
-    """Return the applications of a trip; `radius` of the tyre [m]."""
+    """Return the applications of a trip that were counted; `radius` of the tyre [m]."""
     delay = transport_time(trip)
     trip = aligned(trip, delay)
-    places = find_applications(trip)
-    background = find_background(trip, places)
+    every = find_applications(trip)
+    background = find_background(trip, every)
     excess = trip.concentration - background.at(trip.speed)
     emitted = np.cumsum(1e6 * trip.flow * excess) * PERIOD
     before = round(min(delay, BEFORE_S) / PERIOD)
-    particles, energy = [], []
-    for k, (start, end) in enumerate(places):
+    places, particles, energy = [], [], []
+    starts = [start for start, _ in every]
+    for (start, end), after in zip(every, [*starts[1:], len(emitted) + before], strict=False):
         first = max(start - before, 0)
-        last = end + round(TAIL_S / PERIOD)
-        if k + 1 < len(places):
-            last = min(last, places[k + 1][0] - before)
+        last = min(end + round(TAIL_S / PERIOD), after - before)
         last = min(max(last, first + 1), len(emitted) - 1)
+        if not trip.counted[first:last].all():
+            continue
+        places.append((start, end))
         particles.append(float(emitted[last] - emitted[min(first, last)]))
         part = slice(start, end)
         energy.append(PERIOD * float(np.sum(trip.torque[part] * trip.speed[part])) / radius)
@@ -244,4 +251,5 @@ def extract(trip: Recorded, radius: float) -> Applications:
         background,
         delay,
         trip,
+        len(every) - len(places),
     )

@@ -4,13 +4,15 @@ The manifest is a CSV file, a row a trip: `trip`, `file`, `test` (1: held out). 
 has `t` [s], `vehicle_speed` [m/s], `calliper_pressure_fr` [bar], `brake_torque_fr` [N m],
 `disc_temperature_fr` [degC], `particle_concentration` [1/cm^3 in the sampled flow] and `tunnel_flow` [m^3/s],
 or the names and units of a file of columns.
-Rows without a value are between two samples: the counter has one a second, the others about ten.
+Rows without a value are between two samples: the counter has one a second, the others about ten. Where the
+counter drops out for longer, the brake applications are left out.
 """
 
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brakelab.arrays import Array
 from brakelab.identify.dust.features import (
@@ -47,6 +49,7 @@ COLUMNS: Final = (
 IN_ORDER: Final = (COLUMNS[0], COLUMNS[2], COLUMNS[3], COLUMNS[1], COLUMNS[4])
 """As `Columns.contract` has them."""
 LONGEST_GAP: Final = 5.0  # s between two samples
+LEAST_COUNTED: Final = 0.5  # share of a trip
 FEWEST_TRIPS: Final = 3  # for identification: each is left out once
 FEWEST_APPLICATIONS: Final = 20  # applications of a trip
 UNLIKE: Final = 1.5  # times the heating of the others: rain and wind make a fifth, °F 1.8
@@ -78,6 +81,9 @@ def read_trips(manifest: Path, config: Config, axle: str, given: Path | None = N
             raise UserError(str(path), f"trip {row['trip']}", remedy)
         if found.particles.sum() <= 0.0:
             raise UserError(str(path), "particle_concentration", "does not rise when the brake is applied")
+        if found.left_out:
+            many = f"{found.left_out} brake application{'s are' if found.left_out > 1 else ' is'} left out"
+            say(f"{path}: particle_concentration: {off_count(trip)}; {many}")
         trips.append(found)
         heating.append(numbers_of(_applications(trip, columns), columns).heating)
     if sum(not trip.test for trip in trips) < FEWEST_TRIPS:
@@ -113,16 +119,36 @@ def read_trip(path: Path, name: str, test: bool, described: Columns) -> Recorded
     if len(t) < 2:
         raise UserError(str(path), "t", "must rise from row to row")
     grid = np.arange(t[0], t[-1], PERIOD)
-    even = {c: on_grid(path, c, t, columns[c], grid) for c in COLUMNS[1:]}
+    count = COLUMNS[5]
+    even = {c: on_grid(path, c, t, columns[c], grid, c == count) for c in COLUMNS[1:]}
+    counted = ~in_gap(t[np.isfinite(columns[count])], grid)
     _check_ranges(path, even)
     speed, pressure, torque, temperature, concentration, flow = even.values()
     pressure = pressure - described.rig.push_out_pressure
     trip = Recorded(
         name, test, grid - grid[0], np.maximum(speed, 0.0), pressure, np.abs(torque), temperature,
-        concentration, flow,
+        concentration, flow, counted,
     )  # fmt: skip
+    if counted.mean() < LEAST_COUNTED:
+        raise UserError(
+            str(path), count, f"{off_count(trip)}; too much of a trip of {grid[-1] - grid[0]:.0f} s"
+        )
     _check_units(path, trip, described)
     return trip
+
+
+def off_count(trip: Recorded) -> str:
+    """Return how long and where the counter dropped out first."""
+    at = float(trip.t[np.argmin(trip.counted)])
+    return f"no count for {PERIOD * np.count_nonzero(~trip.counted):.0f} s in all, first at t = {at:.0f} s"
+
+
+def in_gap(samples: Array, grid: Array) -> NDArray[np.bool_]:
+    """Return which times of a grid lie between samples that are further apart than `LONGEST_GAP`."""
+    edges = np.concatenate([[-np.inf], samples, [np.inf]])
+    after = np.searchsorted(edges, grid)
+    near = np.minimum(edges[after], grid[-1]) - np.maximum(edges[after - 1], grid[0])
+    return np.asarray(near > LONGEST_GAP)
 
 
 def _read(path: Path, described: Columns) -> dict[str, Array]:
@@ -163,15 +189,15 @@ def _applications(trip: Recorded, columns: Columns) -> list[Recording]:
     ]
 
 
-def on_grid(path: Path, name: str, t: Array, values: Array, grid: Array) -> Array:
+def on_grid(path: Path, name: str, t: Array, values: Array, grid: Array, gaps_pass: bool = False) -> Array:
     """Return samples at the times of a grid; NaN among them is between two samples.
 
     Raises:
-        UserError: two samples are too far apart.
+        UserError: there is none, or two are too far apart and gaps do not pass.
     """
     known = np.isfinite(values)
     gaps = np.diff(t[known], prepend=t[0], append=t[-1])
-    if not known.any() or gaps.max() > LONGEST_GAP:
+    if not known.any() or (gaps.max() > LONGEST_GAP and not gaps_pass):
         at = "no sample" if not known.any() else f"a gap of {gaps.max():.0f} s"
         raise UserError(str(path), name, f"{at}; samples must not be {LONGEST_GAP:.0f} s apart")
     return np.asarray(np.interp(grid, t[known], values[known]))
