@@ -199,5 +199,50 @@ def test_trips_that_do_not_count_alike_are_no_model(trips):
     assert not (trips / "car.toml").exists()
 
 
+def without_count(begin: float, end: float):
+    def change(rows):
+        for row in rows:
+            if begin <= float(row["t"]) < end:
+                row["particle_concentration"] = "nan"
+
+    return lambda folder: rewrite(folder / "trip-1.csv", change)
+
+
+def test_a_counter_that_drops_out_costs_the_applications_of_that_time(short_trips, capsys):
+    config = load_config(CONFIG)
+    whole = reader.read_trips(short_trips / "manifest.csv", config, "front")[0]
+    at = float(whole.start[5])
+    without_count(at - 10.0, at + 10.0)(short_trips)
+    capsys.readouterr()
+    found = reader.read_trips(short_trips / "manifest.csv", config, "front")[0]
+    assert found.left_out - whole.left_out == len(whole.start) - len(found.start) >= 1
+    assert at not in found.start
+    assert "trip-1.csv: particle_concentration: no count for " in capsys.readouterr().err
+
+
+def test_a_trip_that_was_hardly_counted_is_refused(short_trips):
+    assert_refused(
+        short_trips,
+        without_count(100.0, 1e6),
+        r"no count for \d+ s in all, first at t = (99|100) s; too much",
+    )
+
+
+# samples [s] -> which of the seconds 0 … 10 lie in a gap of more than 5 s
+GAPS = {
+    "every second": (range(11), []),
+    "six seconds": ([0, 1, 2, 8, 9, 10], [3, 4, 5, 6, 7, 8]),
+    "five seconds": ([0, 1, 2, 7, 8, 9, 10], []),
+    "late": ([6, 7, 8, 9, 10], [0, 1, 2, 3, 4, 5, 6]),
+    "ends early": ([0, 1, 2, 3, 4], [5, 6, 7, 8, 9, 10]),
+}
+
+
+@pytest.mark.parametrize(("samples", "lost"), GAPS.values(), ids=GAPS)
+def test_a_gap_is_what_lies_between_samples_too_far_apart(samples, lost):
+    found = reader.in_gap(np.array(samples, float), np.arange(11.0))
+    assert np.flatnonzero(found).tolist() == lost
+
+
 def test_columns_are_those_of_the_contract():
     assert reader.COLUMNS == COLUMNS

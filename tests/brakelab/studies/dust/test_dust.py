@@ -38,8 +38,8 @@ def test_a_row_holds_median_and_worst_over_the_draws():
 
 def test_what_is_not_known_per_kilometre_says_so():
     car = OnBoard(0, "monotone law", -0.2, -0.05, 0.85, float("nan"), 12.0, 8.5, 8.0)
-    tables = dust_tables([draw(0.0, 0.0)], [draw(0.0, 0.0)], [car])
-    assert tables[2].rows[0] == (
+    tables = dust_tables([draw(0.0, 0.0)], [draw(0.0, 0.0)], [draw(0.0, 0.0)], [car])
+    assert tables[3].rows[0] == (
         "0",
         "monotone law",
         "-20.0",

@@ -60,8 +60,13 @@ HEAT_ERROR: Final = 3.0  # K, of a trip
 HEAT_NOISE: Final = 0.5  # K
 SPEED_NOISE: Final = 0.03  # m/s
 COUNT_NOISE: Final = 0.04  # share, of a sample
+COUNT_GAIN: Final = 0.04  # share, of a trip
+COUNT_DRIFT: Final = 0.03  # share, from the first to the last minute of a trip
+COUNT_ZERO: Final = 5.0  # 1/cm^3, of a trip
+DROP_OUT: Final = (0.0, 40.0)  # s of a trip without a count
 FLOW: Final = 0.07  # m^3/s
 FLOW_NOISE: Final = 0.01  # share
+ACTIVATION: Final = (8e3, 16e3)  # K, of vapours: 65 to 130 kJ/mol
 DRIVEN: Final = (20e6, 60e6)  # J, of the brake before the first trip: bedded, as UN GTR 24 has it done
 
 
@@ -116,8 +121,12 @@ def _sensed(out: Array, random: Generator) -> dict[str, Array]:
     counted = np.full(n, np.nan)
     read = slice(0, n, round(1.0 / (10 * STEP)))
     seen = out[read, CONCENTRATION]
-    noise = COUNT_NOISE * random.normal(size=len(seen))
-    counted[read] = np.maximum(seen * (1.0 + noise), 0.0)
+    drift = COUNT_DRIFT * random.normal() * np.linspace(0.0, 1.0, len(seen))
+    shown = seen * (1.0 + COUNT_GAIN * random.normal() + drift + COUNT_NOISE * random.normal(size=len(seen)))
+    shown = np.maximum(shown + COUNT_ZERO * random.normal(), 0.0)
+    lost, begins = int(random.uniform(*DROP_OUT)), int(random.uniform(0.0, len(seen)))
+    shown[begins : begins + lost] = np.nan
+    counted[read] = shown
     values = (
         out[:, T],
         np.maximum(out[:, SPEED] + SPEED_NOISE * random.normal(size=n) * (out[:, SPEED] > 0.0), 0.0),
@@ -130,8 +139,11 @@ def _sensed(out: Array, random: Generator) -> dict[str, Array]:
     return dict(zip(COLUMNS, values, strict=True))
 
 
-def drawn_brake(seed: int) -> RecordArray:
-    """Return the drawn van of a seed with its crew, shape (1,), with drawn emission of its linings."""
+def drawn_brake(seed: int, vapour: bool = False) -> RecordArray:
+    """Return the drawn van of a seed with its crew, shape (1,), with drawn emission of its linings.
+
+    `vapour`: by the second form of the law.
+    """
     plant = load_plant(resource("config/plant/lcv.toml"))
     width = load_widths(resource("config/plant/draw.toml"), "wide").model_copy(update={"emission_day": 0.0})
     car = draw(plant, seed, width)
@@ -143,6 +155,7 @@ def drawn_brake(seed: int) -> RecordArray:
             "by_speed": random.uniform(0.3, 0.6),
             "by_power": random.uniform(0.1, 0.4),
             "hot": np.exp(random.uniform(*np.log((12.0, 50.0)))),
+            "activation": random.uniform(*ACTIVATION) if vapour else 0.0,
         }
     )
     car["emission_row"] = law.row()

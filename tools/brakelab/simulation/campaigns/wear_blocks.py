@@ -17,6 +17,7 @@ from brakelab.plant.draw import draw
 from brakelab.plant.records import RecordArray
 from brakelab.plant.wear import pad_wear
 from brakelab.plant.wear_rig import SAMPLE, STEP, wear_block
+from brakelab.simulation.campaigns.instruments import measure_points, weigh
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.scenario_car import scenario_plant, scenario_widths
 from brakelab.simulation.trip.generate import real_driving
@@ -30,8 +31,6 @@ DRIVERS: Final = {"calm": (1.0, 1.0), "lively": (1.5, 1.1)}
 """Factors on deceleration and speed."""
 RUN_IN: Final = 15.0  # g worn off before the first block
 LABORATORY: Final = 0.02  # relative, from block to block
-BALANCE: Final = 0.03  # g
-POINT: Final = 0.010  # mm
 COLUMNS: Final = ("t", "omega", "calliper_pressure", "brake_torque", "disc_temperature")
 THICKNESS: Final = 12.0  # mm
 PAD_MASS: Final = 450.0  # g, two pads with their plates
@@ -116,9 +115,8 @@ def write_programme(car: RecordArray, wheel: int, seed: int, folder: Path, block
             masses = PAD_MASS - np.array([worn, worn + block.worn])
             lost = [pad_wear(car[0]["wear_row"][wheel], PAD_MASS - mass) for mass in masses]
             shape = random.normal(0.0, 0.05, 6)  # mm, how uneven the pads are
-            thick = [THICKNESS - value + shape + random.normal(0.0, POINT, 6) for value in lost]
-            weighed = masses + random.normal(0.0, BALANCE, 2)
-            numbers = [f"{value:.3f}" for value in (*weighed, *thick[0], *thick[1])]
+            thick = measure_points(np.array([THICKNESS - value + shape for value in lost]), random)
+            numbers = [f"{value:.3f}" for value in (*weigh(masses, random), *thick[0], *thick[1])]
             writer.writerow([block.name, f"{block.name}.csv", *numbers])
             header = ",".join(COLUMNS)
             np.savetxt(folder / f"{block.name}.csv", block.trace, "%.4f", ",", header=header, comments="")

@@ -8,9 +8,18 @@ import numpy as np
 from brakelab.arrays import Array
 from brakelab.identify.dust.features import Applications, Recorded, extract
 from brakelab.identify.dust.fit import Judged, choose, judge_all, ranges
+from brakelab.identify.dust.reader import in_gap
 from brakelab.plant.emission import RUN_IN
 from brakelab.plant.wear import RUN_IN as WEAR_RUN_IN
-from brakelab.simulation.campaigns.dust_trips import COLUMNS, CORNER, Trip, campaign, drawn_brake
+from brakelab.simulation.campaigns.dust_trips import (
+    APPLICATION,
+    COLUMNS,
+    CORNER,
+    DAY,
+    Trip,
+    campaign,
+    drawn_brake,
+)
 from brakelab.simulation.closed_loop import new_loop, run_blocks
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from brakelab.stretches import stretches
@@ -28,6 +37,7 @@ PARTICLES: Final = TRUTH_COLUMNS.index("particles_fl")
 BRAKING, LAST = OUTPUT["braking"], OUTPUT["particles_last_brake"]
 MEASURED_AT: Final = 10e6  # m
 LATER: Final = 20  # rows, latest report of an application after it began
+SPREADS: Final = (DAY, APPLICATION)
 QUIET: Final = (0.03, 0.15)
 """Standard deviations of the logarithm, of a day and of an application, of brakes that repeat better."""
 
@@ -83,7 +93,8 @@ def as_recorded(trip: Trip, name: str, test: bool, push_out: float) -> Recorded:
     t, speed, pressure, torque, heat, counted, flow = (trip.columns[column] for column in COLUMNS)
     known = np.isfinite(counted)
     shown = np.interp(t, t[known], counted[known])
-    return Recorded(name, test, t, speed, pressure - push_out, torque, heat, shown, flow)
+    counted_here = ~in_gap(t[known], t)
+    return Recorded(name, test, t, speed, pressure - push_out, torque, heat, shown, flow, counted_here)
 
 
 def _applications(made: list[Trip]) -> list[Applications]:
@@ -95,14 +106,23 @@ def _applications(made: list[Trip]) -> list[Applications]:
     ]
 
 
-def draw_trips(seed: int, quiet: bool = False) -> Draw:
-    """Return the models' results for the trips of a seed."""
-    made = campaign(seed, *QUIET) if quiet else campaign(seed)
+def _while_counted(trip: Trip, so_far: Array) -> float:
+    """Return how many particles of a trip left the brake while the counter counted."""
+    t, shown = trip.columns[COLUMNS[0]], trip.columns[COLUMNS[5]]
+    return float(np.diff(so_far, prepend=0.0)[~in_gap(t[np.isfinite(shown)], t)].sum())
+
+
+def draw_trips(seed: int, quiet: bool = False, vapour: bool = False) -> Draw:
+    """Return the models' results for the trips of a seed; `vapour`: the second form of the law emits."""
+    made = campaign(seed, *(QUIET if quiet else SPREADS), car=drawn_brake(seed, vapour))
     trips = _applications(made)
     trained, test = trips[:-1], trips[-1:]
     judged = judge_all(trained, test, seed)
     chosen = choose(judged)
-    emitted, expected = (np.array([getattr(trip, n)[-1] for trip in made]) for n in ("emitted", "expected"))
+    emitted, expected = (
+        np.array([_while_counted(trip, getattr(trip, name)) for trip in made])
+        for name in ("emitted", "expected")
+    )
     level = emitted[:-1].sum() / expected[:-1].sum()
     counts = np.array([trip.particles.sum() for trip in trips])
     shown = counts[:-1].sum() / emitted[:-1].sum()  # particles missed by the counter

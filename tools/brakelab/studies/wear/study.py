@@ -9,12 +9,13 @@ from numpy.random import Generator
 from brakelab.arrays import Array
 from brakelab.identify.wear.command import law_error
 from brakelab.identify.wear.fit import QUASI_STATIC, Fit, fit_law
-from brakelab.identify.wear.fusion import fuse
+from brakelab.identify.wear.fusion import POINTS, fuse
 from brakelab.identify.wear.reader import stop_regressors
+from brakelab.simulation.campaigns.instruments import measure_points, weigh, workshop_gauge
 from brakelab.simulation.campaigns.wear_blocks import (
-    BALANCE,
     COLUMNS,
-    POINT,
+    PAD_MASS,
+    THICKNESS,
     WornBlock,
     drawn_car,
     programme,
@@ -71,8 +72,10 @@ def measured_block(block: WornBlock, pad_mass: float, random: Generator) -> tupl
         if b - a > 5
     ]
     x = np.sum([stop_regressors(stop) for stop in stops], axis=0)
-    mass = block.worn + random.normal(0.0, np.sqrt(2.0) * BALANCE)
-    return x, mass, block.worn / pad_mass + random.normal(0.0, POINT * np.sqrt(2.0 / 6.0))
+    lost = np.array([0.0, block.worn])
+    mass = weigh(PAD_MASS - lost, random)
+    points = measure_points(np.repeat(THICKNESS - lost[:, None] / pad_mass, POINTS, 1), random)
+    return x, float(mass[0] - mass[1]), float(points[0].mean() - points[1].mean())
 
 
 def dynamometer_laws() -> dict[str, Law]:
@@ -131,6 +134,7 @@ def live(car: CarDrives, law_name: str, law: Law) -> Life:
         record[0]["wear"]["told"] = 1
     pad_mass, pad_life = params[0]["pad_mass"], params[0]["pad_life"]
     worn, climate, driven, points = np.zeros(4), random.normal(), 0.0, 0
+    gauge = workshop_gauge(np.random.default_rng([car.seed, 32]))
     km: list[float] = []
     true: list[Array] = []
     predicted: dict[str, list[Array]] = {mode: [] for mode in MODES}
@@ -149,7 +153,7 @@ def live(car: CarDrives, law_name: str, law: Law) -> Life:
         points += 1
         km.append(driven)
         true.append(np.where(worn / pad_mass <= pad_life, worn / pad_mass, np.nan))
-        seen = worn / pad_mass + random.normal(0.0, GAUGE, 4)
+        seen = gauge(worn / pad_mass)
         for mode, record in records.items():
             wear, deviation = _appraise(params, record)
             predicted[mode].append(wear)

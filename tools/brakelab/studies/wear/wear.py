@@ -200,8 +200,9 @@ TEXT: Final = (
     "of them between two measurements. True wear follows the plant's own law (tools/brakelab/plant/wear.py: "
     "Archard with a regime of heat, running in, a lot of each axle, a climate that changes over 1,000 km), "
     "which nothing on board knows. The ECU's law comes from the dynamometer with linings of another lot on "
-    "another car's brake. A thickness is measured to ± 0.1 mm (standard deviation). `scatter` and `walk` of "
-    "the linings were chosen on cars 0 and 1, which are not judged.\n\n"
+    "another car's brake. Balances and gauges have noise, a zero and a gain of their own "
+    "(tools/brakelab/simulation/campaigns/instruments.py), none of them what the ECU and the fit take them "
+    "for. `scatter` and `walk` of the linings were chosen on cars 0 and 1, which are not judged.\n\n"
     "![True and predicted wear](images/wear.svg)"
 )
 
