@@ -7,6 +7,9 @@ pressure = ["P_Line", "psi"]
 torque = ["Torque", "N m"]
 speed = ["Speed", "rpm"]           # rpm, 1/min, rad/s of the disc; km/h, m/s, mph of the car
 temperature = ["T_disc", "°F"]
+speed_end = ["v_End", "km/h"]      # optional: each row is the summary of a stop; then `time` is how long it
+                                   # took, `pressure` and `torque` are its means, `speed` its begin
+temperature_end = ["T_End", "°C"]  # likewise; `temperature` is that before it
 section = "Step"                   # optional: number of the section of the programme, in every row
 concentration = ["PN", "1/cm³"]    # of trips with a particle counter
 flow = ["Q_tunnel", "m³/h"]        # likewise
@@ -19,7 +22,7 @@ flow = ["Q_tunnel", "m³/h"]        # likewise
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -30,6 +33,7 @@ from ecu.settings.config import Axle, Config, new_params
 from ecu.settings.toml_file import describe, read_toml
 
 Column = tuple[str, str]
+ENDS: Final = {"speed_end": UNITS["speed"], "temperature_end": UNITS["temperature"]}
 
 
 class Names(Section):
@@ -38,16 +42,21 @@ class Names(Section):
     torque: Column
     speed: Column
     temperature: Column
+    speed_end: Column | None = None
+    temperature_end: Column | None = None
     section: Annotated[str, Field(min_length=1)] | None = None
     concentration: Column = ("particle_concentration", "1/cm^3")
     flow: Column = ("tunnel_flow", "m^3/s")
 
     @model_validator(mode="after")
     def _units(self) -> Self:
-        for quantity, units in (UNITS | COUNTED).items():
-            unit = getattr(self, quantity)[1]
-            if unit not in units:
+        for quantity, units in (UNITS | COUNTED | ENDS).items():
+            column = getattr(self, quantity)
+            unit = column[1] if column else ""
+            if column and unit not in units:
                 raise ValueError(f"unit {unit!r} of {quantity} unknown; one of {', '.join(units)}")
+        if self.temperature_end and not self.speed_end:
+            raise ValueError("temperature_end belongs to rows that are stops: give speed_end")
         return self
 
 
@@ -148,9 +157,9 @@ def load_columns(path: Path, known: Columns | None = None) -> Columns:
 def columns_text(columns: Columns) -> str:
     """Return it as TOML."""
     lines = [f'name = "{columns.name}"', "", "[columns]"]
-    for quantity in UNITS:
-        name, unit = getattr(columns.columns, quantity)
-        lines.append(f'{quantity} = ["{name}", "{unit}"]')
+    for quantity in (*UNITS, *ENDS):
+        if column := getattr(columns.columns, quantity):
+            lines.append(f'{quantity} = ["{column[0]}", "{column[1]}"]')
     if columns.columns.section is not None:
         lines.append(f'section = "{columns.columns.section}"')
     for section in ("brake", "rig", "disc", *(["uncertainty"] if columns.uncertainty else [])):

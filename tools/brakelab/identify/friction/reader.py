@@ -6,13 +6,13 @@ turned to be positive; torque of one pad is doubled where the file of columns sa
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
-from brakelab.identify.friction.columns import Columns, load_columns
+from brakelab.identify.friction.columns import ENDS, Columns, load_columns
 from brakelab.identify.friction.recording import NAMES, Recording
 from brakelab.identify.measurement_files import header_of, numbers_of
 from brakelab.identify.samples import alone, continued
@@ -24,7 +24,10 @@ from ecu.errors import UserError
 Places = NDArray[np.int64]
 Labels = NDArray[np.str_]
 
-LEAST_SAMPLES = 100
+LEAST_SAMPLES: Final = 100
+LEAST_STOPS: Final = 5  # of summaries
+STEP_S: Final = 0.05  # of the samples that stand for a summary
+PAUSE_S: Final = 60.0  # between two of them
 PLACES = {".csv": ("line", 2), ".txt": ("line", 2), ".parquet": ("row", 1), ".mf4": ("sample", 1)}
 """Name of a row for each file ending, and the number of the first."""
 
@@ -59,11 +62,13 @@ def read_recording(path: Path, columns: Path | None = None, known: Columns | Non
         remedy = "no file of columns; give --columns (docs/results/friction-lab.md has one)"
         raise UserError(str(path), "", remedy)
     described = load_columns(beside, known)
-    names = [getattr(described.columns, quantity)[0] for quantity in NAMES]
+    ends = [name for name in ENDS if getattr(described.columns, name)]
+    names = [getattr(described.columns, quantity)[0] for quantity in (*NAMES, *ends)]
     damage = Damage()
     word, first = PLACES[path.suffix.lower()]
-    lines, raw, labels = _joined(list(_rows(path, names, described.columns.section, damage, first)))
-    strange = np.array([alone(values) for values in raw[1:]])
+    parts = list(_rows(path, names, described.columns.section, damage, first))
+    lines, raw, labels = _joined(parts, len(names))
+    strange = np.array([alone(values) if not ends else np.zeros(len(values), bool) for values in raw[1:]])
     lone = strange.any(axis=0)
     if lone.any():
         row = int(np.argmax(lone))
@@ -78,6 +83,8 @@ def read_recording(path: Path, columns: Path | None = None, known: Columns | Non
         name = names[int(np.argmin(whole[:, row]))]
         damage.note_damage(int(missing.sum()), f"{word} {lines[row]} ({name} is no number)")
     lines, raw, labels = lines[~missing], raw[:, ~missing], labels[~missing]
+    if ends:
+        raw, labels = _as_samples(path, raw, ends, labels, described)
     raw[0] = continued(raw[0])
     back = np.concatenate([[False], raw[0, 1:] <= np.maximum.accumulate(raw[0])[:-1]])[: raw.shape[1]]
     if back.any():
@@ -94,11 +101,41 @@ def read_recording(path: Path, columns: Path | None = None, known: Columns | Non
     return Read(_in_si(raw, described), described, labels, "; ".join(part for part in (note, cut) if part))
 
 
-def _joined(blocks: list[tuple[Places, Vector, Labels]]) -> tuple[Places, Vector, Labels]:
+def _as_samples(
+    path: Path, rows: Vector, ends: list[str], labels: Labels, described: Columns
+) -> tuple[Vector, Labels]:
+    """Return samples, shape (5, n), that stand for summaries, shape (5 + ends, stops), and their sections.
+
+    A stop slows evenly at its mean pressure and torque; its disc warms evenly.
+    """
+    if path.suffix.lower() == ".mf4":
+        raise UserError(str(path), "speed_end", "a summary of stops is a table: export it as CSV or Parquet")
+    if rows.shape[1] < LEAST_STOPS:
+        raise UserError(str(path), "", f"summaries of {rows.shape[1]} stops; needs {LEAST_STOPS}")
+    bad = np.flatnonzero((rows[:2] <= 0.0).any(axis=0))
+    if len(bad):
+        names = described.columns.time[0], described.columns.pressure[0]
+        remedy = f"{' and '.join(names)} must be above zero in a summary"
+        raise UserError(str(path), f"stop {bad[0] + 1}", remedy)
+    unit = UNITS["time"][described.columns.time[1]]
+    samples: list[Vector] = []
+    begin = 0.0
+    for row in rows.T:
+        lasts, *means = row[:3]
+        t = np.arange(0.0, lasts + 1e-9, STEP_S / unit)
+        end = dict(zip(ends, row[5:], strict=True))
+        slope = np.array([end["speed_end"] - row[3], end.get("temperature_end", row[4]) - row[4]]) / lasts
+        held = np.repeat(np.array(means)[:, None], len(t), 1)
+        samples.append(np.vstack([begin + t, held, row[3:5, None] + slope[:, None] * t]))
+        begin += lasts + PAUSE_S / unit
+    return np.concatenate(samples, axis=1), np.repeat(labels, [part.shape[1] for part in samples])
+
+
+def _joined(blocks: list[tuple[Places, Vector, Labels]], columns: int) -> tuple[Places, Vector, Labels]:
     lines, rows, labels = zip(*blocks, strict=True) if blocks else ((), (), ())
     return (
         np.concatenate([np.empty(0, np.int64), *lines]),
-        np.concatenate([np.empty((5, 0)), *rows], axis=1),
+        np.concatenate([np.empty((columns, 0)), *rows], axis=1),
         np.concatenate([np.empty(0, np.str_), *labels]),
     )
 
