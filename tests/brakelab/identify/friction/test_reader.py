@@ -10,6 +10,7 @@ import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 import pytest
 
+from brakelab.identify.friction.choice import known_candidates
 from brakelab.identify.friction.columns import Columns, columns_text
 from brakelab.identify.friction.reader import read_recording
 from brakelab.identify.friction.recording import Recording, write_recording
@@ -263,6 +264,9 @@ def test_a_row_a_stop_becomes_stops_of_the_same_friction(sheet: Path, stops: Sto
     np.testing.assert_allclose(found.mean, stops.mean, rtol=0.05)
     np.testing.assert_allclose(found.start_temperature, stops.start_temperature, atol=2.0)
     np.testing.assert_allclose(found.inertia, stops.inertia, rtol=0.05)
+    tried = {law.name for law in known_candidates(read.columns, found)}
+    assert tried >= {"surface", "table", "quadratic"}
+    assert "ostermeyer" not in tried
 
 
 @pytest.mark.parametrize(

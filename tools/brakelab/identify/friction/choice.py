@@ -10,12 +10,13 @@ programme: a law that goes on beyond the data must be better by a quarter than e
 at their edge; of those within the quarter, the least criterion.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from brakelab.identify.friction.candidate import Candidate
 from brakelab.identify.friction.candidates import candidates
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.fit import Fitted, error_of, fit, refit
@@ -72,6 +73,16 @@ def hottest(stops: Stops) -> tuple[Stops, Stops]:
     return some(stops, np.sort(order[:cut])), some(stops, np.sort(order[cut:]))
 
 
+def known_candidates(columns: Columns, stops: Stops, own: Sequence[str] = ()) -> list[Candidate]:
+    """Return the laws that recordings can show: of summaries none that starts at a friction of its stop.
+
+    Raises:
+        ValueError: as `candidates`.
+    """
+    laws = candidates(stops, columns.brake, own)
+    return [law for law in laws if not (columns.columns.speed_end and law.starts_at_measured)]
+
+
 def identify(
     columns: Columns,
     stops: Stops,
@@ -83,7 +94,7 @@ def identify(
 
     `progress` receives a line for each law; `own`: files and entry points of own laws. Two processes.
     """
-    names = [candidate.name for candidate in candidates(stops, columns.brake, own)]
+    names = [candidate.name for candidate in known_candidates(columns, stops, own)]
     jobs = [_Job(name, columns.brake, stops, unseen, own) for name in names]
     done: dict[str, Judged] = {}
     with new_pool(PROCESSES) as pool:

@@ -7,9 +7,8 @@ import numpy as np
 from rich.console import Console
 
 from brakelab.identify.friction.analysis import history_effect, principal_components
-from brakelab.identify.friction.candidates import candidates
 from brakelab.identify.friction.check import refuse_nonsense
-from brakelab.identify.friction.choice import hottest, identify
+from brakelab.identify.friction.choice import hottest, identify, known_candidates
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.discovered_law import discovered_law
 from brakelab.identify.friction.dynamometer import new_bench
@@ -145,7 +144,7 @@ def friction(
         own = (*own, str(discover))
     own = tuple(str(Path(code).resolve()) if code.endswith(".py") else code for code in own)
     try:
-        known = candidates(measured.stops, measured.columns.brake, own)
+        known = known_candidates(measured.columns, measured.stops, own)
     except ValueError as error:
         raise UserError("--own", "", str(error)) from None
     laws = {candidate.name: candidate for candidate in known}

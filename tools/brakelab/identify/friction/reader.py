@@ -26,7 +26,7 @@ Labels = NDArray[np.str_]
 
 LEAST_SAMPLES: Final = 100
 LEAST_STOPS: Final = 5  # of summaries
-STEP_S: Final = 0.05  # of the samples that stand for a summary
+STEP_S: Final = 0.01  # of the samples that stand for a summary
 PAUSE_S: Final = 60.0  # between two of them
 PLACES = {".csv": ("line", 2), ".txt": ("line", 2), ".parquet": ("row", 1), ".mf4": ("sample", 1)}
 """Name of a row for each file ending, and the number of the first."""

@@ -175,6 +175,8 @@ def gradient_line(of: Measured) -> Slope | None:
     """
     found = of.conditions
     known = np.flatnonzero(np.isfinite(found.gradient))
+    if len(known) < FEWEST_STOPS:
+        return None
     kinds = levels(inputs_of(of.stops)[known])
     _, kind = np.unique(kinds, axis=0, return_inverse=True)
     x, mu = np.log2(found.gradient[known]), of.stops.mean[known].copy()
