@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.configured import shipped
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.simulation.scenario_car import with_draw
@@ -16,7 +17,6 @@ from brakelab.studies.control.blending import (
     counted,
     demanded,
     loss,
-    shipped,
     stop,
     torques,
     wrong_friction,

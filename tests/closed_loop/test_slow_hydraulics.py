@@ -5,8 +5,9 @@ import pytest
 
 from brakelab.simulation.accuracy import friction_errors, window
 from brakelab.simulation.closed_loop import Loop, new_loop, run
+from brakelab.simulation.configured import shipped
 from brakelab.simulation.scenario_car import with_draw
-from brakelab.studies.control.blending import blended, changing, shipped
+from brakelab.studies.control.blending import blended, changing
 from ecu.algorithm.step import new_state
 from ecu.contract.faults import BRAKE_FAILED, fault_mask
 from ecu.settings.config import Config, load_config, new_params

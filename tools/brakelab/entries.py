@@ -24,15 +24,14 @@ from brakelab.plant.friction.laws import friction, law_row
 from brakelab.plant.linings import Linings
 from brakelab.plant.wear import pad_wear
 from brakelab.simulation.campaigns.wear_blocks import drawn_car, run_block
+from brakelab.simulation.configured import configured, shipped
 from brakelab.simulation.ecu_inputs import ecu_inputs
-from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.vehicle_bus import N_TRUTH, new_noise, new_values, new_vehicle
 from brakelab.warm import compile_all
 from ecu.bus.database import load_database
 from ecu.bus.freshness import target_dtype
 from ecu.contract.records import FRAME, INPUTS, new_record
 from ecu.contract.signals import N_OUTPUTS
-from ecu.settings.config import load_config
 from ecu.settings.resources import resource
 
 
@@ -41,7 +40,7 @@ def call_every_entry() -> None:
     compile_all()
     _run_laboratory()
     recording = Recording(new_record(INPUTS, 2), np.ones((2, 4)), np.zeros(2, np.int64))
-    replay_errors([recording], [load_config(resource("config/suv.toml"))])
+    replay_errors([recording], [configured()])
     ecu_inputs(new_record(FRAME), 1)
     database = load_database(resource("dbc/brake_ecu.dbc"))
     message = database.messages[0]
@@ -50,7 +49,7 @@ def call_every_entry() -> None:
     frames["stamp_ns"] = np.arange(FEWEST_FRAMES)
     read_series([frames], database)
     cooling_rate(1e-3, 1e-4, 10.0, 0.0)
-    vehicle = new_vehicle(load_scenario(resource("config/scenarios/stop-1.toml")), 0)
+    vehicle = new_vehicle(shipped("stop-1"), 0)
     noise, values, row = new_noise(0), new_values(), np.zeros(N_TRUTH)
     measure(vehicle, noise, values, row)
     go_on(vehicle, np.zeros(1, target_dtype(N_OUTPUTS))[0], noise, values, row)

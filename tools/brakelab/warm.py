@@ -23,11 +23,10 @@ from brakelab.replay.command import replay_into
 from brakelab.replay.quality import Findings
 from brakelab.rig.vehicle_node import warm_up
 from brakelab.simulation.closed_loop import new_loop, run
-from brakelab.simulation.scenario import load_scenario
+from brakelab.simulation.configured import configured, shipped
 from brakelab.simulation.simulate import simulate
 from ecu.jit import CompileCounter
 from ecu.output import Level, asked, new_policy
-from ecu.settings.config import load_config
 from ecu.settings.resources import resource
 
 FRAMES: Final = 50
@@ -49,8 +48,8 @@ def compile_vehicle() -> None:
 
 def compile_closed_loop() -> None:
     """Compile vehicle, daemon and bus between them; what either has compiled is loaded."""
-    scenario = load_scenario(resource("config/scenarios/stop-1.toml"))
-    run(new_loop(scenario, load_config(resource("config/suv.toml")), 0), seconds=0.05)
+    scenario = shipped("stop-1")
+    run(new_loop(scenario, configured(), 0), seconds=0.05)
 
 
 def compile_commands() -> None:
@@ -82,7 +81,7 @@ def compile_all() -> None:
     """Compile all of the laboratory's kernels that stand above."""
     compile_vehicle()
     compile_closed_loop()
-    warm_up(load_scenario(resource("config/scenarios/demo.toml")))
+    warm_up(shipped("demo"))
     compile_commands()
 
 

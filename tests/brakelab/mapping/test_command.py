@@ -17,8 +17,8 @@ from brakelab.mapping.physics import propose
 from brakelab.mapping.series import Series, read_series
 from brakelab.mapping.torque import brake_torque, stand_in
 from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.simulation.configured import shipped
 from brakelab.simulation.ecu_inputs import vehicle_frames
-from brakelab.studies.accuracy.observers_cases import shipped
 from ecu import cli
 from ecu.bus.database import load_database
 from ecu.bus.signal_map import load_signal_map, read_signal_map

@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.simulation.closed_loop import Drive, new_loop, plans, run
+from brakelab.simulation.configured import configured, shipped, with_keys
 from brakelab.simulation.ecu_inputs import ecu_inputs, vehicle_frames
-from brakelab.simulation.scenario import load_scenario
 from ecu.contract.records import RecordArray
-from ecu.settings.config import load_config, new_params
-from ecu.settings.resources import resource
+from ecu.settings.config import new_params
 
 MESSAGES_IN: Final = 13
 """Input messages of the contract at 10 and 20 ms."""
@@ -40,9 +39,8 @@ class Stop(NamedTuple):
 @cache
 def simulated_stop() -> Stop:
     """Return a stop from 120 km/h at 4 m/s^2 after 6 s of cruising."""
-    scenario = load_scenario(resource("config/scenarios/stop-1.toml"))
-    scenario = scenario.model_copy(update={"wheel_transducers": True})
-    config = load_config(resource("config/suv.toml"))
+    scenario = with_keys(shipped("stop-1"), {"wheel_transducers": True})
+    config = configured()
     drive = run(new_loop(scenario, config, seed=0))
     frames = vehicle_frames(drive.frames)
     inputs = ecu_inputs(frames, len(drive.t))

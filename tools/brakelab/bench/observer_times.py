@@ -4,8 +4,7 @@ from collections.abc import Callable
 
 from brakelab.bench.braking import simulated_stop
 from brakelab.bench.step import CYCLES, ROUNDS, run_steps
-from brakelab.simulation.observer import with_observer
-from brakelab.studies.accuracy.observers_cases import configured
+from brakelab.simulation.configured import configured, with_observer
 from brakelab.studies.measure import Figure, alternate, timed
 from ecu.algorithm.step import new_state
 from ecu.contract.params import OBSERVERS

@@ -6,8 +6,8 @@ from typing import Final
 from brakelab.bench.observer_times import step_times
 from brakelab.results.processes import new_pool
 from brakelab.results.progress import tracked
+from brakelab.simulation.configured import configured
 from brakelab.studies.accuracy.observers import Sample, Task, observer_rows, tasks
-from brakelab.studies.accuracy.observers_cases import configured
 from brakelab.studies.accuracy.observers_picture import PICTURED, consistency_of, write_picture
 from brakelab.studies.accuracy.observers_table import finite, observer_tables
 from brakelab.studies.accuracy.stops import drawn_of

@@ -26,7 +26,7 @@ from brakelab.logs.log_quality import LogQuality
 from brakelab.replay.command import replay
 from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import VEHICLE_BUS, new_loop, run
-from brakelab.simulation.scenario import load_scenario
+from brakelab.simulation.configured import configured, shipped
 from brakelab.studies.accuracy.table import time_table
 from brakelab.studies.measure import Figure, Row, Task, alternate, installed, machine
 from brakelab.studies.study import Asked, Measured, Study
@@ -36,7 +36,7 @@ from ecu.bus.receive import new_reception, receive
 from ecu.bus.receive_plan import ReceivePlan, contract_receive_plan
 from ecu.contract.records import INPUTS, OUTPUTS, RecordArray, new_record
 from ecu.contract.signals import CYCLE_NS
-from ecu.settings.config import load_config, new_params
+from ecu.settings.config import new_params
 from ecu.settings.resources import resource
 
 ROUNDS: Final = 3
@@ -152,8 +152,8 @@ def _write(log: Path, frames: RecordArray) -> dict[str, Path]:
 
 
 def _tables(folder: Path, rounds: int, scenario: str, part_s: float) -> list[Table]:
-    config = load_config(resource("config/suv.toml"))
-    drive = run(new_loop(load_scenario(resource(f"config/scenarios/{scenario}.toml")), config, 0))
+    config = configured()
+    drive = run(new_loop(shipped(scenario), config, 0))
     frames, cycles = drive.frames, len(drive.t)
     part = frames[frames["stamp_ns"] < frames["stamp_ns"][0] + round(part_s * 1e9)]
     part_cycles = min(cycles, round(part_s * 1e9) // CYCLE_NS)

@@ -20,7 +20,7 @@ from brakelab.fleet.wear import pads_table
 from brakelab.replay.source import announced, load_source
 from brakelab.results.outputs import check_outputs
 from brakelab.results.progress import progress_bar
-from brakelab.simulation.observer import with_observer
+from brakelab.simulation.configured import with_observer
 from ecu.errors import UserError
 from ecu.output import fault, give, say, wrote
 from ecu.settings.config import load_config

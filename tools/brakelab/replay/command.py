@@ -36,7 +36,7 @@ from brakelab.results.outputs import check_outputs, config_files
 from brakelab.results.pads import pads_of
 from brakelab.results.prediction import SHORT
 from brakelab.results.progress import progress_bar
-from brakelab.simulation.observer import with_observer
+from brakelab.simulation.configured import with_observer
 from ecu import __version__
 from ecu.algorithm.step import new_state
 from ecu.bus.receive_plan import ReceivePlan

@@ -23,7 +23,7 @@ import structlog
 from brakelab.rig.live import choose_bus, drive
 from brakelab.rig.vehicle_node import live_through, new_node
 from brakelab.simulation.closed_loop import START_NS, plans
-from brakelab.simulation.scenario import load_scenario
+from brakelab.simulation.configured import configured, shipped
 from brakelab.simulation.vehicle_bus import N_TRUTH
 from ecu.algorithm.step import INITIAL, initial_part
 from ecu.bus.protocol import BusStatus
@@ -40,7 +40,7 @@ from ecu.runtime.cycle import Progress, cycle_once
 from ecu.runtime.memory import new_ecu
 from ecu.runtime.side_process import Recorder
 from ecu.runtime.warm_up import warm_up
-from ecu.settings.config import load_config, new_params, store_key
+from ecu.settings.config import new_params, store_key
 from ecu.settings.resources import resource
 
 HOUR: Final = 360_000  # cycles
@@ -76,7 +76,7 @@ class Rig:
     """Bus, clock and car of a virtual run."""
 
     def __init__(self, scenario: str, seconds: float, seed: int) -> None:
-        found = load_scenario(resource(f"config/scenarios/{scenario}.toml"))
+        found = shipped(scenario)
         once = float(found.script().phases["seconds"].sum())
         self.node = new_node(found.model_copy(update={"repeat": int(seconds / once) + 2}), seed)
         self.name, self.now_ns, self.heard, self.periods, self.oversleeps = "soak", 0, 0, 0, False
@@ -144,7 +144,7 @@ class Life(NamedTuple):
 
 def run_one(rig: Rig, folder: Path, first: int, cycles: int, memory: list[float]) -> Life:
     """Run one ECU with the values stored in `folder`, from cycle number `first` on."""
-    config = load_config(resource("config/suv.toml"))
+    config = configured()
     params = new_params(config)
     params["transmit"] = True
     stored = restored(folder, config, params)
@@ -216,7 +216,7 @@ def soak_virtual(hours: float, seed: int, folder: Path) -> list[Check]:
         lives.append(run_one(rig, folder, first, cycles, memory))
         first += cycles
     took_s = time.monotonic() - began_s
-    config = load_config(resource("config/suv.toml"))
+    config = configured()
     end = restored(folder, config, new_params(config))
     odometer = float(end[1]["wear"]["odometer"][0]) if end else 0.0
     driven = float(rig.node.side.vehicle.state["distance"][0])

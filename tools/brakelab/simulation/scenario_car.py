@@ -7,6 +7,7 @@ from pydantic import BaseModel
 
 from brakelab.plant.description import Plant, PlantFileError, load_plant
 from brakelab.plant.draw import Widths, load_widths
+from brakelab.simulation.configured import with_keys
 from brakelab.simulation.plant_of_config import AS_CONFIG, write_plant
 from brakelab.simulation.scenario import Scenario
 from ecu.errors import UserError
@@ -29,10 +30,10 @@ def scenario_plant(scenario: Scenario) -> Plant:
         raise UserError(error.where, error.place, error.remedy) from None
     changed: dict[str, BaseModel] = {}
     if scenario.payload is not None:
-        changed["body"] = scenario.payload.body(plant.vehicle.body)
+        changed["vehicle.body"] = scenario.payload.body(plant.vehicle.body)
     if scenario.engine is not None:
-        changed["engine"] = scenario.engine
-    return plant.model_copy(update={"vehicle": plant.vehicle.model_copy(update=changed)})
+        changed["vehicle.engine"] = scenario.engine
+    return with_keys(plant, changed)
 
 
 def with_plant(scenario: Scenario, plant: str | None) -> Scenario:

@@ -9,12 +9,12 @@ from typing import Final, NamedTuple
 
 from brakelab.results.processes import run_each
 from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.simulation.configured import configured
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.studies.lies_cell import BEGIN, DECEL, Cell, judge
 from ecu.contract.signals import CORNERS, INPUT_SIGNALS
-from ecu.settings.config import Config, load_config
-from ecu.settings.resources import resource
+from ecu.settings.config import Config
 
 BRAKINGS: Final = 12
 CARS: Final = {"suv": False, "suv-blended": True, "sedan": False}
@@ -139,7 +139,7 @@ def scenario(car: str, road: str, fault: list[Fault]) -> Scenario:
 
 def cells(car: str, road: str, name: str, seed: int, wanted: tuple[str, ...] = ()) -> list[Cell]:
     """Drive every lie of an input (or the `wanted` ones) by a car drawn from `seed` on a road."""
-    config: Config = load_config(resource(f"config/{car}.toml"))
+    config: Config = configured(car)
     sound = run(new_loop(scenario(car, road, []), config, seed))
     found = []
     for lie, fault in lies(name).items():

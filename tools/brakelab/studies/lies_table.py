@@ -9,12 +9,10 @@ import numpy as np
 
 from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import new_loop, run
-from brakelab.studies.accuracy.observers_cases import shipped
+from brakelab.simulation.configured import configured, shipped
 from brakelab.studies.lies import CARS, INPUTS, ROADS
 from brakelab.studies.lies_cell import COSTS, LONG_S, SHORT_S, TAKES, Cell
 from ecu.contract.faults import IMPLAUSIBLE, fault_mask, fault_names
-from ecu.settings.config import load_config
-from ecu.settings.resources import resource
 
 IN_TIME: Final = 2.0  # s
 WORST_LIES: Final = 10
@@ -108,7 +106,7 @@ def _alarms(cells: list[Cell], cars: int) -> Table:
     rows = [(f"{car}, {road}, car 1", "–", _names(mask)) for (car, road), mask in sound.items()]
     own = sum(IMPLAUSIBLE.values())
     for seed in range(cars):
-        drive = run(new_loop(shipped(HOUR), load_config(resource("config/suv.toml")), seed))
+        drive = run(new_loop(shipped(HOUR), configured(), seed))
         mask = int(np.bitwise_or.reduce(fault_mask(drive.outputs) & own))
         rows.append((f"suv, real driving, car {seed}", f"{drive.t[-1] / 3600.0:.1f}", _names(mask)))
     return Table("False alarms of sound cars", ("drive", "hours", "inputs named"), rows, "")

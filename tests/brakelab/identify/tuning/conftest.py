@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from brakelab.simulation.observer import with_observer
+from brakelab.simulation.configured import with_observer
 from ecu.settings.config import Config, load_config
 from ecu.settings.resources import resource
 

@@ -15,7 +15,7 @@ from brakelab.identify.tuning.recording import (
 )
 from brakelab.identify.tuning.replay import replay_errors
 from brakelab.simulation.closed_loop import Drive, new_loop, run
-from brakelab.simulation.observer import with_observer
+from brakelab.simulation.configured import with_observer
 from brakelab.simulation.scenario import load_scenario
 from ecu.contract.records import new_record
 from ecu.settings.config import Config

@@ -10,8 +10,8 @@ from brakelab.identify.vehicle.parameters import free_radius, parameters_of, val
 from brakelab.identify.vehicle.reader import read_drives
 from brakelab.identify.vehicle.solve import identify
 from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.simulation.configured import shipped
 from brakelab.simulation.simulate import write_columns
-from brakelab.studies.accuracy.observers_cases import shipped
 from brakelab.studies.accuracy.vehicle import start_of, true_theta, with_parameters
 from ecu.algorithm.vehicle import rolling_radius
 from ecu.errors import UserError

@@ -9,8 +9,8 @@ from brakelab.logs.physics.judge import judge, range_lines
 from brakelab.logs.physics.samples import ANY_CAR, SAMPLED, Car, Collector, car_of
 from brakelab.logs.signal_file import freshness_at_any_rate
 from brakelab.simulation.closed_loop import new_loop, run
+from brakelab.simulation.configured import shipped
 from brakelab.simulation.ecu_inputs import ecu_inputs, vehicle_frames
-from brakelab.studies.accuracy.observers_cases import shipped
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.settings.config import load_config, new_params
 from ecu.settings.resources import resource

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from brakelab.simulation.accuracy import AXLES, estimate_errors
+from brakelab.simulation.configured import configured, shipped
 from brakelab.simulation.scenario_car import with_draw
 from brakelab.studies.accuracy.ablation import (
     ABLATIONS,
@@ -16,7 +17,6 @@ from brakelab.studies.accuracy.ablation import (
     without,
 )
 from brakelab.studies.accuracy.observers import counted
-from brakelab.studies.accuracy.observers_cases import configured, shipped
 from ecu.algorithm.estimation.joint.layout import LEVEL, MASS, RATIO
 from ecu.algorithm.estimation.joint.learned import KEPT, LEVEL_PAUSE
 from ecu.algorithm.estimation.joint.prior import LEVEL_AXLE, LEVEL_COMMON, LEVEL_WHEEL, PRIOR

@@ -6,6 +6,7 @@ import pytest
 from brakelab.plant.records import GRAVITY, RecordArray
 from brakelab.plant.tyre import magic_formula
 from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.configured import configured, shipped
 from brakelab.simulation.scenario_car import with_draw
 from brakelab.studies.accuracy import bound
 from brakelab.studies.accuracy.bound import LEVELS, Bound, Limit, axle_errors, bound_table, bounds_of
@@ -26,7 +27,7 @@ from brakelab.studies.accuracy.bound_car import (
 from brakelab.studies.accuracy.bound_system import wander_of
 from brakelab.studies.accuracy.linear_bound import System, filtered, sampled
 from brakelab.studies.accuracy.observers import counted
-from brakelab.studies.accuracy.observers_cases import ACCURACY, configured, shipped
+from brakelab.studies.accuracy.observers_cases import ACCURACY
 from ecu.contract.signals import CORNERS
 
 

@@ -12,6 +12,7 @@ from brakelab.bench import command
 from brakelab.bench import observers as bench
 from brakelab.results.text_table import markdown
 from brakelab.simulation.closed_loop import Drive
+from brakelab.simulation.configured import configured, shipped
 from brakelab.studies import output
 from brakelab.studies.accuracy.observers import (
     JOINT,
@@ -35,8 +36,6 @@ from brakelab.studies.accuracy.observers_cases import (
     TRANSDUCERS,
     WRONG_START,
     Setup,
-    configured,
-    shipped,
 )
 from brakelab.studies.accuracy.observers_picture import HEIGHT, LEFT, TOP, Consistency, write_picture
 from brakelab.studies.accuracy.observers_table import finite, observer_tables

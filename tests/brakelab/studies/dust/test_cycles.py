@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("sklearn", reason="needs scikit-learn (extra learn)")
 
-from brakelab.studies.dust.cycle_cars import SHIPPED, configured, drawn, share_of_energy
+from brakelab.studies.dust.cycle_cars import SHIPPED, drawn, share_of_energy, with_models
 from brakelab.studies.dust.cycle_drives import CYCLES, CycleDrive
 from brakelab.studies.dust.cycle_open import OpenDrive, drive_open, profile, wltp_brake_profile
 from brakelab.studies.dust.cycles import Drawn, Driven, draw_rows, limit_rows, open_rows, saving_rows
@@ -91,7 +91,7 @@ def test_the_work_of_a_braking_on_the_level_is_what_resistances_leave_of_the_mot
     """20 m/s to 10 m/s within 8 s: m/2 (v1^2 - v2^2) less drag and rolling over that distance."""
     t, v = np.array([0.0, 5.0, 13.0, 20.0]), np.array([20.0, 20.0, 10.0, 10.0])
     car = drawn("suv", 3)
-    params = new_params(configured("suv", (law(), law())))
+    params = new_params(with_models("suv", (law(), law())))
     done = drive_open(car, params, [(20.0, profile(t, v, np.zeros(4)))])
     metres = 8.0 * 15.0
     drag = float(car["drag_factor"][0]) * metres * 250.0  # mean of v^2 by distance: (v1^2 + v2^2) / 2

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.studies.accuracy.observers_cases import configured
+from brakelab.simulation.configured import configured
 from brakelab.studies.entries.drives import NAMES, SETS, CarTracks, Track
 from brakelab.studies.entries.export import export_car, new_folder
 from ecu.contract.signals import INPUT

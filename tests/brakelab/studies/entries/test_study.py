@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from brakelab.arrays import Vector
-from brakelab.studies.accuracy.observers_cases import configured, shipped
+from brakelab.simulation.configured import configured, shipped
 from brakelab.studies.entries.drives import NAMES, SETS, CarTracks, Track, applications, drive_track
 from brakelab.studies.entries.inputs import Inputs
 from brakelab.studies.entries.observer import EntryError, load_class

@@ -19,6 +19,7 @@ from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.recording import Recording
 from brakelab.identify.friction.stops import Stops, find_stops
 from brakelab.identify.units import UNITS
+from brakelab.simulation.configured import with_keys
 from ecu.errors import UserError
 
 USUAL: Final = (0.42, 60.0, 2.4e-4)  # friction, inertia [kg m^2], heating [K/J]
@@ -126,7 +127,7 @@ def refuse_units(applications: Sequence[Recording], columns: Columns, where: str
 
 def measure(recording: Recording, columns: Columns, where: str) -> tuple[Numbers, Stops]:
     """Return the three numbers of a recording, and its stops. Raises `UserError`, one line."""
-    free = columns.model_copy(update={"rig": columns.rig.model_copy(update={"inertia": None})})
+    free = with_keys(columns, {"rig.inertia": None})
     stops = find_stops(recording, free, where)
     radius = columns.brake.effective_radius
     energy, rise = [], []

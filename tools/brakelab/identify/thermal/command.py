@@ -13,6 +13,7 @@ from brakelab.identify.thermal.page import Judged, unidentified, write_page
 from brakelab.identify.thermal.reader import ThermalLog, read_drives
 from brakelab.identify.thermal.result import errors_of, judge, section_of, start_of
 from brakelab.results.outputs import check_outputs, config_files
+from brakelab.simulation.configured import with_keys
 from ecu.errors import UserError
 from ecu.output import give, wrote
 from ecu.settings.config import Axle, Config, load_config
@@ -47,12 +48,12 @@ def _about(axle: Judged) -> str:
 
 def with_fits(config: Config, fits: dict[str, Fit]) -> Config:
     """Return the configuration that the written file is, for programs that go on with it."""
-    changed = {}
+    keys: dict[str, float] = {}
     for name, fit in fits.items():
         axle: Axle = getattr(config, name)
         section = section_of(fit, axle, errors_of(fit, axle), "")
-        changed[name] = axle.model_copy(update={key: float(value) for key, (value, _) in section.items()})
-    return config.model_copy(update=changed)
+        keys |= {f"{name}.{key}": float(value) for key, (value, _) in section.items()}
+    return with_keys(config, keys)
 
 
 def identify_thermal(logs: Sequence[Path], config: Path, map: Path | None, out: Path) -> int:

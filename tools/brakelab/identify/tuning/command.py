@@ -18,7 +18,7 @@ from brakelab.results.console import new_console
 from brakelab.results.outputs import check_outputs, config_files, write_text
 from brakelab.results.progress import progress_bar
 from brakelab.results.text_table import Table, show
-from brakelab.simulation.observer import with_observer
+from brakelab.simulation.configured import with_observer
 from brakelab.simulation.scenario import Scenario, load_scenario
 from ecu import __version__
 from ecu.errors import UserError

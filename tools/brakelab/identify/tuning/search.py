@@ -20,7 +20,7 @@ from pymoo.core.problem import Problem
 from pymoo.problems.static import StaticProblem
 
 from brakelab.identify.tuning.recording import Errors
-from brakelab.simulation.observer import with_observer
+from brakelab.simulation.configured import with_observer
 from ecu.settings.config import Config
 
 RANGES: Final = {

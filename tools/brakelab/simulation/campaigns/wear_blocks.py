@@ -18,11 +18,10 @@ from brakelab.plant.records import RecordArray
 from brakelab.plant.wear import pad_wear
 from brakelab.plant.wear_rig import SAMPLE, STEP, wear_block
 from brakelab.simulation.campaigns.instruments import measure_points, weigh
-from brakelab.simulation.scenario import load_scenario
+from brakelab.simulation.configured import shipped
 from brakelab.simulation.scenario_car import scenario_plant, scenario_widths
 from brakelab.simulation.trip.generate import real_driving
 from brakelab.simulation.trip.table import KMH, brakings
-from ecu.settings.resources import resource
 
 APPLICATIONS: Final = 300
 ROADS: Final = {"trip": (0.0, 999.0), "town": (0.0, 60.0), "country": (60.0, 90.0), "motorway": (90.0, 999.0)}
@@ -68,7 +67,7 @@ def road_stops(road: str, driver: str, seed: int) -> Array:
 
 def drawn_car(seed: int) -> RecordArray:
     """Return the simulated SUV of a seed, shape (1,), without the variation of climate by day."""
-    scenario = load_scenario(resource("config/scenarios/real-driving.toml"))
+    scenario = shipped("real-driving")
     width = scenario_widths(scenario).model_copy(update={"wear_climate": 0.0})
     return draw(scenario_plant(scenario), seed, width)
 

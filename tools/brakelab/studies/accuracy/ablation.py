@@ -18,10 +18,11 @@ from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.accuracy import AXLES, estimate_errors
 from brakelab.simulation.closed_loop import Drive, new_loop, plans, run
+from brakelab.simulation.configured import configured, shipped
 from brakelab.simulation.ecu_inputs import ecu_inputs, vehicle_frames
 from brakelab.simulation.scenario import Scenario
 from brakelab.studies.accuracy.observers import ORDINARY, counted
-from brakelab.studies.accuracy.observers_cases import ACCURACY, configured, shipped
+from brakelab.studies.accuracy.observers_cases import ACCURACY
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,

@@ -21,6 +21,7 @@ from brakelab.arrays import Vector
 from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.accuracy import AXLES, estimate_errors
+from brakelab.simulation.configured import configured, shipped
 from brakelab.simulation.scenario_car import with_draw
 from brakelab.simulation.vehicle_bus import new_vehicle
 from brakelab.studies.accuracy.bound_car import (
@@ -49,7 +50,7 @@ from brakelab.studies.accuracy.bound_car import (
 from brakelab.studies.accuracy.bound_system import PRIOR, Wander, before_stop, prior, system_of, wander_of
 from brakelab.studies.accuracy.linear_bound import filtered, sampled
 from brakelab.studies.accuracy.observers import JOINT, ORDINARY, counted, drive_car
-from brakelab.studies.accuracy.observers_cases import ACCURACY, Setup, configured, goals, shipped
+from brakelab.studies.accuracy.observers_cases import ACCURACY, Setup, goals
 from brakelab.studies.accuracy.observers_table import ROUNDING
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.algorithm.estimation.joint import layout

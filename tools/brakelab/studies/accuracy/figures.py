@@ -15,11 +15,11 @@ from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.accuracy import AXLES, LOWEST_SPEED, achieved_decel, columns, nrmse, window
 from brakelab.simulation.closed_loop import Drive, FrictionOverride, new_loop, run
-from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.simulation.configured import configured, shipped
+from brakelab.simulation.scenario import Scenario
 from brakelab.studies.physics.heat import heat_panels
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
-from ecu.settings.config import load_config
 from ecu.settings.resources import resource
 
 CAR: Final = 0
@@ -70,7 +70,7 @@ PICTURES: Final = {
 
 
 def _scenario(name: str, pedal: float | None = None) -> Scenario:
-    found = load_scenario(resource(f"config/scenarios/{name}.toml"))
+    found = shipped(name)
     if pedal is None:
         return found
     phases = [one if one.pedal is None else one.model_copy(update={"pedal": pedal}) for one in found.phase]
@@ -79,7 +79,7 @@ def _scenario(name: str, pedal: float | None = None) -> Scenario:
 
 def _driven(shown: Shown) -> tuple[Drive, Vector]:
     """Return a drive, and its deceleration by the torques [m/s^2]."""
-    loop = new_loop(_scenario(shown.scenario, shown.pedal), load_config(resource("config/suv.toml")), CAR)
+    loop = new_loop(_scenario(shown.scenario, shown.pedal), configured(), CAR)
     drive = run(loop)
     return drive, achieved_decel(loop, drive)
 
@@ -142,7 +142,7 @@ def blended(drives: dict[int, Drive]) -> list[Panel]:
 
 def error_of(wrong: float) -> float:
     """Return the mean error of the deceleration [%] in stop #1 where the friction in use is `wrong`."""
-    loop = new_loop(_scenario("stop-1"), load_config(resource("config/suv.toml")), CAR)
+    loop = new_loop(_scenario("stop-1"), configured(), CAR)
     drive = run(loop, override=FrictionOverride(1.0 + wrong))
     rows = window(drive)
     return float(100.0 * np.mean(achieved_decel(loop, drive)[rows] / drive.truth["decel_demand"][rows] - 1.0))

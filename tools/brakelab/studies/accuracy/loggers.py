@@ -24,15 +24,14 @@ from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.results.verdict import Goal, verdict
 from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.configured import configured, shipped, with_keys
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.simulation.simulate import write_columns
-from brakelab.studies.accuracy.observers_cases import shipped
 from brakelab.studies.accuracy.table import spread
 from brakelab.studies.measure import figure
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
-from ecu.settings.config import Config, load_config, new_params
-from ecu.settings.resources import resource
+from ecu.settings.config import Config, new_params
 
 CARS: Final = 20
 GOAL: Final = 4.0  # %
@@ -80,9 +79,8 @@ class Recorded(NamedTuple):
 
 def uncorrected() -> Config:
     """Return the configuration of an ECU that corrects nothing; pressures are proportional."""
-    config = load_config(resource("config/suv.toml"))
     changed = {"distribution": "fixed", "front_share": SHARE, "compensation": "off"}
-    return config.model_copy(update={"control": config.control.model_copy(update=changed)})
+    return with_keys(configured(), {f"control.{key}": value for key, value in changed.items()})
 
 
 def recorded_scenario() -> Scenario:

@@ -16,7 +16,7 @@ from brakelab.arrays import Vector
 from brakelab.logs.signal_file import freshness_at_any_rate
 from brakelab.simulation.accuracy import AXLES, LOWEST_SPEED, columns, friction_errors, nrmse
 from brakelab.simulation.closed_loop import Drive, new_loop, run
-from brakelab.simulation.observer import with_observer
+from brakelab.simulation.configured import configured, shipped, with_observer
 from brakelab.simulation.scenario_car import with_draw
 from brakelab.studies.accuracy.observers_cases import (
     ACCURACY,
@@ -28,8 +28,6 @@ from brakelab.studies.accuracy.observers_cases import (
     WRONG_START,
     Case,
     Setup,
-    configured,
-    shipped,
 )
 from brakelab.studies.measure import Figure, figure
 from brakelab.studies.study import WIDE

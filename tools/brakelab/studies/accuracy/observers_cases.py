@@ -6,14 +6,14 @@ nominal configuration and nothing learned, `adapted` after `config/scenarios/ord
 odd seeds, positive for even ones.
 """
 
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Callable, Mapping
+from operator import attrgetter
 from typing import Any, Final, NamedTuple
 
 from brakelab.plant.sensor_errors import ABSENT, SensorErrors
-from brakelab.simulation.scenario import Phase, RoadByPlace, Scenario, SteeringFile, load_scenario
-from ecu.settings.config import Config, load_config
-from ecu.settings.resources import resource
+from brakelab.simulation.configured import shipped, with_keys
+from brakelab.simulation.scenario import Phase, RoadByPlace, Scenario, SteeringFile
+from ecu.settings.config import Config
 
 EVERY_SENSOR: Final = (
     *("accel_x", "accel_y", "yaw_rate", "vehicle_speed"),
@@ -54,8 +54,11 @@ def _as_is(setup: Setup, sign: float) -> Setup:
 
 def _unguarded(setup: Setup, sign: float) -> Setup:
     """Let wheels lock: the behaviour of the observers is measured (Figure 5.5)."""
-    control = setup.config.control.model_copy(update={"slip_guard": False})
-    return setup._replace(config=setup.config.model_copy(update={"control": control}))
+    return _configured(setup, {"control.slip_guard": False})
+
+
+def _configured(setup: Setup, keys: Mapping[str, Any]) -> Setup:
+    return setup._replace(config=with_keys(setup.config, keys))
 
 
 class Case(NamedTuple):
@@ -72,18 +75,6 @@ class Case(NamedTuple):
     """The change is there in ordinary driving too."""
     beside: str = ""
     """The case whose errors it may exceed by a quarter."""
-
-
-@cache
-def shipped(name: str) -> Scenario:
-    """Return a scenario of config/scenarios."""
-    return load_scenario(resource(f"config/scenarios/{name}.toml"))
-
-
-@cache
-def configured() -> Config:
-    """Return the configuration under test."""
-    return load_config(resource("config/suv.toml"))
 
 
 def _stop(**brake: Any) -> Scenario:
@@ -127,13 +118,10 @@ def _changed(**factors: float) -> Change:
     """Return the change of configured values by 1 ± a share, by section and key with two underlines."""
 
     def change(setup: Setup, sign: float) -> Setup:
-        config = setup.config
-        for name, share in factors.items():
-            place, key = name.split("__")
-            section = getattr(config, place)
-            value = getattr(section, key) * (1.0 + sign * share)
-            config = config.model_copy(update={place: section.model_copy(update={key: value})})
-        return setup._replace(config=config)
+        keys = {name.replace("__", "."): 1.0 + sign * share for name, share in factors.items()}
+        return _configured(
+            setup, {key: attrgetter(key)(setup.config) * factor for key, factor in keys.items()}
+        )
 
     return change
 
@@ -148,9 +136,7 @@ def _scenario(setup: Setup, **update: Any) -> Setup:
 
 
 def _late_speed(setup: Setup, sign: float) -> Setup:
-    sensors = setup.config.sensors.model_copy(update={"vehicle_speed_delay": 0.15})
-    setup = setup._replace(config=setup.config.model_copy(update={"sensors": sensors}))
-    return _scenario(setup, vehicle_speed="gnss")
+    return _scenario(_configured(setup, {"sensors.vehicle_speed_delay": 0.15}), vehicle_speed="gnss")
 
 
 def _slow_inputs(setup: Setup, sign: float) -> Setup:
@@ -299,11 +285,7 @@ WRONG_START: Final = "linings 25 % off"
 
 def _wrong_start(setup: Setup, sign: float) -> Setup:
     """Configure nominal frictions a quarter above those of config/plant/suv.toml."""
-    config = setup.config
-    for place, true in (("front", 0.3825), ("rear", 0.495)):
-        axle = getattr(config, place).model_copy(update={"mu_nominal": 1.25 * true})
-        config = config.model_copy(update={place: axle})
-    return setup._replace(config=config)
+    return _configured(setup, {"front.mu_nominal": 1.25 * 0.3825, "rear.mu_nominal": 1.25 * 0.495})
 
 
 EVENTS: Final = {

@@ -10,8 +10,9 @@ from brakelab.arrays import Vector
 from brakelab.results.chart import write_svg
 from brakelab.simulation.accuracy import AXLES, columns
 from brakelab.simulation.closed_loop import Drive
+from brakelab.simulation.configured import configured, shipped
 from brakelab.studies.accuracy.observers import JOINT, ORDINARY, counted, drive_car
-from brakelab.studies.accuracy.observers_cases import Setup, configured, shipped
+from brakelab.studies.accuracy.observers_cases import Setup
 from ecu.algorithm.estimation.joint.kalman import GATE
 from ecu.contract.signals import CORNERS
 

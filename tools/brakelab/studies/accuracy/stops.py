@@ -19,7 +19,8 @@ from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.accuracy import AXLES, achieved_decel, friction_errors, window
 from brakelab.simulation.closed_loop import Drive, new_loop, run
-from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.simulation.configured import shipped, with_keys
+from brakelab.simulation.scenario import Scenario
 from brakelab.simulation.scenario_car import with_draw
 from brakelab.studies.measure import Figure, figure, plain_row
 from brakelab.studies.study import Asked, Measured, Study
@@ -96,7 +97,7 @@ class _Seed(NamedTuple):
 
 
 def _one_car(scenario: Scenario, config: Config, seed: int) -> _Seed:
-    plain = config.model_copy(update={"control": config.control.model_copy(update={"compensation": "off"})})
+    plain = with_keys(config, {"control.compensation": "off"})
     ours = _brake(scenario, config, seed)
     uncompensated = _brake(scenario, plain, seed)
     ideal = _brake(scenario, config, seed, ideal=True)
@@ -121,7 +122,7 @@ Result = tuple[list[Friction], Compensation]
 def case_result(config: Config, seeds: int, draw: str, case: Named) -> Result:
     """Drive one test with cars 0 to `seeds` - 1; figures are median, least and greatest over them."""
     speed_known, test = case
-    stop = with_draw(load_scenario(resource(f"config/scenarios/stop-{test}.toml")), draw)
+    stop = with_draw(shipped(f"stop-{test}"), draw)
     scenario = stop.model_copy(update={"vehicle_speed": "ideal" if speed_known else "none"})
     cars = [_one_car(scenario, config, seed) for seed in range(seeds)]
     friction = []

@@ -23,7 +23,7 @@ from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.results.verdict import Goal, met, verdict
 from brakelab.simulation.accuracy import AXLES
-from brakelab.simulation.observer import with_observer
+from brakelab.simulation.configured import with_observer
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.scenario_car import with_draw
 from brakelab.studies.study import Asked, Measured, Study, picture

@@ -7,6 +7,7 @@ START and with the identified CONFIG, and each predicts the brake applications.
 """
 
 from collections.abc import Iterable, Sequence
+from operator import attrgetter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
@@ -28,13 +29,12 @@ from brakelab.results.prediction import errors
 from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.configured import configured, shipped, with_keys
 from brakelab.simulation.scenario import Scenario, Trace
 from brakelab.simulation.simulate import write_columns
-from brakelab.studies.accuracy.observers_cases import shipped
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
-from ecu.settings.config import Config, load_config, new_params
-from ecu.settings.resources import resource
+from ecu.settings.config import Config, new_params
 
 CARS: Final = 10
 OFF: Final = 0.20
@@ -71,31 +71,19 @@ class Car(NamedTuple):
 
 def start_of(seed: int) -> Config:
     """Return config/suv.toml with its keys 20 % off."""
-    config = load_config(resource("config/suv.toml"))
+    config = configured()
     random = np.random.default_rng([seed, 16])
-    update: dict[str, Any] = {}
+    wrong: dict[str, float | None] = {}
     for section in ("vehicle", "front", "rear"):
-        own: Any = getattr(config, section)
-        keys = KEYS.get(section, KEYS["front"])
-        wrong = {name: getattr(own, name) * (1.0 + OFF * random.choice([-1.0, 1.0])) for name in keys}
-        if section == "vehicle":
-            wrong |= {"laden_mass": None, "laden_front_axle": None, "laden_cog_height": None}
-        update[section] = own.model_copy(update=wrong)
-    return config.model_copy(update=update)
+        for key in (f"{section}.{name}" for name in KEYS.get(section, KEYS["front"])):
+            wrong[key] = attrgetter(key)(config) * (1.0 + OFF * random.choice([-1.0, 1.0]))
+    unladen = dict.fromkeys(f"vehicle.laden_{name}" for name in ("mass", "front_axle", "cog_height"))
+    return with_keys(config, wrong | unladen)
 
 
 def with_parameters(config: Config, parameters: Sequence[Parameter]) -> Config:
     """Return `config` with the keys that were identified."""
-    update: dict[str, Any] = {}
-    for section in ("vehicle", "front", "rear", "sensors"):
-        own: Any = getattr(config, section)
-        values = {
-            one.key.partition(".")[2]: one.value
-            for one in parameters
-            if not one.remedy and one.key.startswith(f"{section}.")
-        }
-        update[section] = own.model_copy(update=values)
-    return config.model_copy(update=update)
+    return with_keys(config, {one.key: one.value for one in parameters if not one.remedy})
 
 
 def true_theta(car: Any, drive: Drive, sensors: Any, push_out: Sequence[float]) -> Vector:
@@ -146,14 +134,13 @@ def _on_own_road(scenario: Scenario, seed: int, driven: float) -> Scenario:
     place, grade = np.transpose([(0.0, first), *shifted])
     grade -= np.interp(np.linspace(0.0, driven, 4000), place, grade).mean()
     level = list(zip(place.tolist(), grade.tolist(), strict=True))
-    road = scenario.road.model_copy(update={"grade": level})
-    return scenario.model_copy(update={"road": road})
+    return with_keys(scenario, {"road.grade": level})
 
 
 def beside_truth(seed: int) -> tuple[list[Beside], Config]:
     """Drive one car and identify it; return its keys and the CONFIG that results."""
     start = start_of(seed)
-    suv, driven = load_config(resource("config/suv.toml")), DRIVEN
+    suv, driven = configured(), DRIVEN
     for _ in range(2):  # the first drive shows how far it is
         loop = new_loop(_on_own_road(shipped("identify"), seed, driven), suv, seed)
         car, sensors = loop.sides.vehicle.params[0].copy(), loop.sides.vehicle.sensors.copy()
@@ -176,7 +163,7 @@ def identified_of(seed: int) -> Car:
     keys, config = beside_truth(seed)
     trace = Trace(generate="real-driving", seed=seed + 100)
     trip = shipped("real-driving").model_copy(update={"trace": trace})
-    other = run(new_loop(trip, load_config(resource("config/suv.toml")), seed), seconds=STRANGER)
+    other = run(new_loop(trip, configured(), seed), seconds=STRANGER)
     before, count = _predicted(other, start_of(seed))
     after, _ = _predicted(other, config)
     return Car(keys, before, after, count)

@@ -20,16 +20,16 @@ from brakelab.plant.sensor_errors import SensorErrors
 from brakelab.results.text_table import Table
 from brakelab.simulation.accuracy import FULL, window
 from brakelab.simulation.closed_loop import Drive, Loop, new_loop, run
+from brakelab.simulation.configured import configured, shipped, with_keys
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.studies.accuracy.observers import JOINT, ORDINARY, drive_car
-from brakelab.studies.accuracy.observers_cases import Setup, shipped
+from brakelab.studies.accuracy.observers_cases import Setup
 from brakelab.studies.accuracy.table import spread
 from brakelab.studies.measure import figure
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
-from ecu.settings.config import Config, load_config, new_params
-from ecu.settings.resources import resource
+from ecu.settings.config import Config, new_params
 
 CARS: Final = 5
 TOLERANCE: Final = 2.0  # %
@@ -69,12 +69,8 @@ class Loss(NamedTuple):
 
 def blended(share: float, compensate: bool = True) -> Config:
     """Return config/suv.toml with this share of the motors on both axles, its friction compensated or not."""
-    config = load_config(resource("config/suv.toml"))
-    blending = config.blending.model_copy(update={"front": share, "rear": share})
-    config = config.model_copy(update={"blending": blending})
-    if compensate:
-        return config
-    return config.model_copy(update={"control": config.control.model_copy(update={"compensation": "off"})})
+    keys = {"blending.front": share, "blending.rear": share}
+    return with_keys(configured(), keys if compensate else keys | {"control.compensation": "off"})
 
 
 def stop(decel: float) -> Scenario:
@@ -164,11 +160,8 @@ def wrong_friction(share: float, ratio: float, compensate: bool, seed: int) -> f
     config = blended(share, compensate)
     loop = new_loop(shipped("hand-over"), config, seed)
     true = loop.sides.vehicle.state["mu_b"][0]
-    update = {
-        axle: getattr(config, axle).model_copy(update={"mu_nominal": ratio * float(true[wheel])})
-        for axle, wheel in (("front", 0), ("rear", 2))
-    }
-    config = config.model_copy(update=update)
+    rear = ratio * float(true[2])
+    config = with_keys(config, {"front.mu_nominal": ratio * float(true[0]), "rear.mu_nominal": rear})
     loop = new_loop(shipped("hand-over"), config, seed)
     freeze_friction(loop)
     drive = run(loop)

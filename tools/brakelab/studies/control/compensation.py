@@ -18,10 +18,10 @@ from brakelab.arrays import Vector
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK
 from brakelab.simulation.accuracy import LOWEST_SPEED, achieved_decel, columns
 from brakelab.simulation.closed_loop import Drive, FrictionOverride, new_loop, run
-from brakelab.simulation.scenario import Scenario, load_scenario
+from brakelab.simulation.configured import shipped, with_keys
+from brakelab.simulation.scenario import Scenario
 from brakelab.stretches import stretches
 from ecu.settings.config import Config
-from ecu.settings.resources import resource
 
 CARS: Final = 5
 RUNS: Final = {
@@ -73,7 +73,7 @@ class Run(NamedTuple):
 def manoeuvre(name: str) -> Scenario:
     """Return a manoeuvre of `MANOEUVRES`."""
     how = MANOEUVRES[name]
-    scenario = load_scenario(resource(f"config/scenarios/{how.scenario}.toml"))
+    scenario = shipped(how.scenario)
     scenario = scenario.model_copy(update={"blending": how.motors > 0.0})
     if how.pedal is None:
         return scenario
@@ -81,18 +81,16 @@ def manoeuvre(name: str) -> Scenario:
     return scenario.model_copy(update={"phase": phases})
 
 
-def configured(name: str, config: Config) -> Config:
+def config_of(name: str, config: Config) -> Config:
     """Return the configuration of a manoeuvre of `MANOEUVRES`."""
     share = MANOEUVRES[name].motors
-    blending = config.blending.model_copy(update={"front": share, "rear": share})
-    return config.model_copy(update={"blending": blending})
+    return with_keys(config, {"blending.front": share, "blending.rear": share})
 
 
 def drive_as(kind: str, scenario: Scenario, config: Config, seed: int) -> Run:
     """Drive a scenario as one of `RUNS`."""
     if kind == "uncompensated":
-        control = config.control.model_copy(update={"compensation": "off"})
-        config = config.model_copy(update={"control": control})
+        config = with_keys(config, {"control.compensation": "off"})
     loop = new_loop(scenario, config, seed)
     drive = run(loop, override=FrictionOverride(GIVEN_SHARE.get(kind, 0.0)))
     return Run(drive, achieved_decel(loop, drive))
@@ -178,7 +176,7 @@ def fade_pedal(run: Run) -> tuple[Vector, Vector]:
 
 def drive_all(name: str, config: Config, seed: int) -> dict[str, Run]:
     """Drive a manoeuvre of `MANOEUVRES` as each of `RUNS`."""
-    scenario, config = manoeuvre(name), configured(name, config)
+    scenario, config = manoeuvre(name), config_of(name, config)
     return {kind: drive_as(kind, scenario, config, seed) for kind in RUNS}
 
 
@@ -207,7 +205,7 @@ def one_car(config: Config, seed: int) -> Car:
             car.errors[name, kind] = application_errors(runs[kind], runs["ideal"])
             if name in CURVES:
                 car.levels[name, kind] = level_errors(runs[kind], runs["ideal"])
-    fade = load_scenario(resource("config/scenarios/fade.toml"))
+    fade = shipped("fade")
     for kind in FADE_RUNS:
         car.fade[kind] = fade_pedal(drive_as(kind, fade, config, seed))
     return car

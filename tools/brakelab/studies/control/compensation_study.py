@@ -6,12 +6,11 @@ from typing import Final
 
 from brakelab.results.chart import write_chart
 from brakelab.results.processes import run_each
+from brakelab.simulation.configured import configured
 from brakelab.studies.control.compensation import CARS, one_car
 from brakelab.studies.control.compensation_picture import LEGEND, pictured
 from brakelab.studies.control.compensation_table import compensation_tables
 from brakelab.studies.study import Asked, Measured, Study
-from ecu.settings.config import load_config
-from ecu.settings.resources import resource
 
 TEXT: Final = (
     "Manoeuvres of section 5.7 and fade (6.2.3) in closed loop with the ECU of config/suv.toml, motors at "
@@ -25,7 +24,7 @@ TEXT: Final = (
 
 
 def _run(asked: Asked) -> Measured:
-    config = load_config(resource("config/suv.toml"))
+    config = configured()
     cars = run_each("compensation", partial(one_car, config), range(CARS))
 
     def draw(folder: Path) -> None:

@@ -10,16 +10,15 @@ import numpy as np
 
 from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.configured import configured, shipped, with_keys
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Phase, Scenario
-from brakelab.studies.accuracy.observers_cases import shipped
 from brakelab.studies.accuracy.table import spread
 from brakelab.studies.measure import figure
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.faults import BRAKE_FAILED
 from ecu.contract.signals import CORNERS
-from ecu.settings.config import Config, load_config
-from ecu.settings.resources import resource
+from ecu.settings.config import Config
 
 CARS: Final = 5
 FAILS: Final = 9.0  # s, in the second application
@@ -27,7 +26,7 @@ AFTER: Final = 0.3  # s
 LONG: Final = 1.0  # s
 LOWEST_SPEED: Final = 5.0  # m/s
 DECELS: Final = (2.0, 4.0, 6.0)
-HALF: Final = {"front": 0.5, "rear": 0.5}
+HALF: Final = {"blending.front": 0.5, "blending.rear": 0.5}
 
 
 class Left(NamedTuple):
@@ -91,9 +90,7 @@ FAILURES: Final[dict[str, Fault]] = {
 
 def failure_tables() -> list[Table]:
     """Return the tables, each figure as median (least–greatest) over the cars."""
-    config = load_config(resource("config/suv.toml"))
-    blended = load_config(resource("config/suv-blended.toml"))
-    blended = blended.model_copy(update={"blending": blended.blending.model_copy(update=HALF)})
+    config, blended = configured(), with_keys(configured("suv-blended"), HALF)
     return [
         *(_table(f"{decel:g} m/s², linings alone", decel, config, False) for decel in DECELS),
         _table("4 m/s², motors at 50 %", 4.0, blended, True),

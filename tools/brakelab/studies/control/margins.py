@@ -24,10 +24,10 @@ from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.accuracy import AXLES, columns
 from brakelab.simulation.closed_loop import FrictionOverride, new_loop, run
-from brakelab.simulation.scenario import Phase, Scenario, load_scenario
+from brakelab.simulation.configured import configured, shipped
+from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.studies.study import Asked, Measured, Study, picture
-from ecu.settings.config import Config, load_config
-from ecu.settings.resources import resource
+from ecu.settings.config import Config
 
 CARS: Final = 5
 FREQUENCIES: Final = (0.2, 0.35, 0.6, 1.0, 1.7, 2.8, 4.5, 7.0)  # Hz; the observer's windows end at 10
@@ -75,9 +75,7 @@ def braking() -> Scenario:
         Phase(kind="cruise", speed=40.0, seconds=1.0),
         Phase(kind="brake", decel=DECEL, until_speed=0.5 * LEAST_SPEED),
     ]
-    return load_scenario(resource("config/scenarios/stop-1.toml")).model_copy(
-        update={"initial_speed": 40.0, "phase": phases}
-    )
+    return shipped("stop-1").model_copy(update={"initial_speed": 40.0, "phase": phases})
 
 
 def in_phase(t: NDArray[np.float64], y: NDArray[np.float64], frequency: float) -> complex:
@@ -205,7 +203,7 @@ TEXT: Final = (
 
 
 def _run(asked: Asked) -> Measured:
-    config = load_config(resource("config/suv.toml"))
+    config = configured()
     cars = run_each("margins", partial(margins_of, config), range(CARS))
     drawn = picture("control-margins.svg", margin_panels(cars), LEGEND)
     return Measured(margin_tables(cars), draw=drawn)

@@ -17,8 +17,9 @@ from brakelab.plant.emission import RUN_IN
 from brakelab.plant.records import RecordArray
 from brakelab.plant.wear import RUN_IN as WEAR_RUN_IN
 from brakelab.simulation.campaigns.dust_trips import TRIPS, campaign
+from brakelab.simulation.configured import configured, with_keys
 from brakelab.studies.dust.study import as_recorded, section
-from ecu.settings.config import Config, load_config, new_params
+from ecu.settings.config import Config, new_params
 from ecu.settings.dust import Dust
 from ecu.settings.resources import resource
 
@@ -63,7 +64,7 @@ def drawn(plant: str, seed: int) -> RecordArray:
 @cache
 def emission_models(name: str, plant: str, seed: int) -> tuple[Dust, Dust]:
     """Return the models of front and rear brakes of a drawn car, as a laboratory finds them."""
-    config, car, found = load_config(resource(f"config/{name}.toml")), drawn(plant, seed), []
+    config, car, found = configured(name), drawn(plant, seed), []
     radius = new_params(config)[0]["wheel_radius"]
     for axle, corner in CORNERS.items():
         push_out = getattr(config, axle).push_out_pressure
@@ -75,13 +76,11 @@ def emission_models(name: str, plant: str, seed: int) -> tuple[Dust, Dust]:
     return found[0], found[1]
 
 
-def configured(name: str, models: tuple[Dust, Dust], minimise: str = "off") -> Config:
+def with_models(name: str, models: tuple[Dust, Dust], minimise: str = "off") -> Config:
     """Return a shipped configuration with emission models, and `control.minimise`."""
-    config = load_config(resource(f"config/{name}.toml"))
-    axles = (config.front, config.rear)
-    front, rear = (axle.model_copy(update={"dust": dust}) for axle, dust in zip(axles, models, strict=True))
-    control = config.control.model_copy(update={"minimise": minimise})
-    return config.model_copy(update={"front": front, "rear": rear, "control": control})
+    front, rear = models
+    keys = {"front.dust": front, "rear.dust": rear, "control.minimise": minimise}
+    return with_keys(configured(name), keys)
 
 
 def share_of_energy(work: np.ndarray) -> float:

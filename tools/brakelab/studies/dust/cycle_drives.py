@@ -11,16 +11,16 @@ import numpy as np
 from brakelab.arrays import Array
 from brakelab.plant.cycle import CYCLE
 from brakelab.simulation.closed_loop import Loop, new_loop, run_blocks
-from brakelab.simulation.scenario import Scenario, Trace, load_scenario
+from brakelab.simulation.configured import shipped
+from brakelab.simulation.scenario import Scenario, Trace
 from brakelab.simulation.trip.wltp_brake import DISC_AT_START, TRIPS
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
-from brakelab.studies.dust.cycle_cars import Shipped, bedded, configured
+from brakelab.studies.dust.cycle_cars import Shipped, bedded, with_models
 from ecu.algorithm.step import new_state
 from ecu.contract.faults import WHEEL_SLIPS
 from ecu.contract.signals import OUTPUT
 from ecu.settings.annex5 import Z_ORDERED
 from ecu.settings.dust import Dust
-from ecu.settings.resources import resource
 
 REAL_DRIVING, WLTP_BRAKE = "real-driving", "wltp-brake"
 CYCLES: Final = (REAL_DRIVING, WLTP_BRAKE)
@@ -96,7 +96,7 @@ def _high(slips: Array) -> float:
 
 
 def _scenarios(plant: str, cycle: str, blending: bool) -> list[Scenario]:
-    base = load_scenario(resource(f"config/scenarios/{cycle}.toml"))
+    base = shipped(cycle)
     changed: dict[str, Any] = {"plant": plant, "vehicle_speed": "none", "blending": blending}
     base = base.model_copy(update=changed)
     if cycle == REAL_DRIVING:
@@ -123,7 +123,7 @@ def _hand_on(before: Loop, after: Loop) -> None:
 
 def drive_cycle(car: Shipped, models: tuple[Dust, Dust], cycle: str, minimise: str, seed: int) -> CycleDrive:
     """Drive the drawn car of a seed over one of `CYCLES`."""
-    config = configured(car.config, models, minimise)
+    config = with_models(car.config, models, minimise)
     blending = config.blending.front + config.blending.rear > 0.0
     sums, last = _Sums(), None
     distance, regenerated, charged = 0.0, 0.0, 0.0

@@ -9,13 +9,14 @@ from brakelab.results import euro7
 from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.results.verdict import Goal, verdict
+from brakelab.simulation.configured import with_keys
 from brakelab.studies.dust.cycle_cars import (
     SHIPPED,
     Shipped,
-    configured,
     drawn,
     emission_models,
     share_of_energy,
+    with_models,
 )
 from brakelab.studies.dust.cycle_drives import CYCLES, REAL_DRIVING, WLTP_BRAKE, CycleDrive, drive_cycle
 from brakelab.studies.dust.cycle_open import OpenDrive, drive_open, real_driving_profile, wltp_brake_profile
@@ -64,7 +65,7 @@ def drive_shipped(number: int) -> Driven:
     trip, opened = real_driving_profile(), {}
     if car.config == car.plant:
         for policy in POLICIES:
-            params = new_params(configured(car.config, models, policy))
+            params = new_params(with_models(car.config, models, policy))
             opened[policy] = drive_open(drawn(car.plant, CAR), params, trip)
     return Driven(car, drives, opened)
 
@@ -77,7 +78,7 @@ def draw_car(number: int, name: str) -> Drawn:
     for cycle, trips in ((REAL_DRIVING, real_driving_profile()), (WLTP_BRAKE, wltp_brake_profile())):
         drives: dict[str, OpenDrive] = {}
         for policy in ("off", "dust", "wear"):
-            config = configured(name, models, policy)
+            config = with_models(name, models, policy)
             if policy == "wear":
                 config = _measured(config, drives["off"])
             drives[policy] = drive_open(car, new_params(config), trips)
@@ -95,8 +96,7 @@ def _measured(config: Config, driven: OpenDrive) -> Config:
     """
     by_work = driven.worn / driven.work
     scale = float(by_work[2:].sum() / by_work[:2].sum())
-    pad = config.rear.pad.model_copy(update={"road_scale": scale})
-    return config.model_copy(update={"rear": config.rear.model_copy(update={"pad": pad})})
+    return with_keys(config, {"rear.pad.road_scale": scale})
 
 
 def limit_rows(cars: list[Driven]) -> list[tuple[str, ...]]:

@@ -21,6 +21,7 @@ from brakelab.simulation.campaigns.dust_trips import (
     drawn_brake,
 )
 from brakelab.simulation.closed_loop import new_loop, run_blocks
+from brakelab.simulation.configured import configured, with_keys
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from brakelab.stretches import stretches
 from brakelab.studies.wear.drives import trip_scenario
@@ -29,9 +30,8 @@ from ecu.contract.dust import MODELS
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import OUTPUT
 from ecu.pads import GAUGE, add_measurement
-from ecu.settings.config import load_config, new_params
+from ecu.settings.config import new_params
 from ecu.settings.dust import Dust
-from ecu.settings.resources import resource
 
 PARTICLES: Final = TRUTH_COLUMNS.index("particles_fl")
 BRAKING, LAST = OUTPUT["braking"], OUTPUT["particles_last_brake"]
@@ -98,7 +98,7 @@ def as_recorded(trip: Trip, name: str, test: bool, push_out: float) -> Recorded:
 
 
 def _applications(made: list[Trip]) -> list[Applications]:
-    config = load_config(resource("config/lcv.toml"))
+    config = configured("lcv")
     radius = float(new_params(config)[0]["wheel_radius"][CORNER])
     return [
         extract(as_recorded(trip, f"trip {k}", k == len(made), config.front.push_out_pressure), radius)
@@ -195,9 +195,7 @@ def drive_on_board(seed: int) -> OnBoard:
     trips = _applications(campaign(seed))
     judged = judge_all(trips[:-1], [], seed)
     chosen = choose(judged)
-    config = load_config(resource("config/lcv.toml"))
-    front = config.front.model_copy(update={"dust": section(chosen, trips[:-1])})
-    config = config.model_copy(update={"front": front})
+    config = with_keys(configured("lcv"), {"front.dust": section(chosen, trips[:-1])})
     scenario = trip_scenario(5000 + seed, "usual").model_copy(update={"plant": "lcv"})
     loop = new_loop(scenario, config, seed)
     brake = drawn_brake(seed)

@@ -14,13 +14,13 @@ from brakelab.replay.engine import new_ecu, run_frames
 from brakelab.replay.source import load_source
 from brakelab.results.brakes import BrakeBook, BrakeRow
 from brakelab.simulation.closed_loop import START_NS, Drive, new_loop, run
+from brakelab.simulation.configured import configured, shipped
 from brakelab.simulation.ecu_inputs import ecu_inputs
 from brakelab.simulation.scenario import Scenario
 from brakelab.simulation.scenario_car import with_draw
 from brakelab.stretches import stretches
 from brakelab.studies.accuracy.loggers import LOGGERS, logger_columns, recorded_scenario, uncorrected
 from brakelab.studies.accuracy.observers import ORDINARY, counted
-from brakelab.studies.accuracy.observers_cases import configured, shipped
 from brakelab.studies.accuracy.stops import TESTS
 from brakelab.studies.entries.inputs import TRANSDUCERS
 from ecu.bus.receive import new_reception

@@ -7,7 +7,7 @@ import numpy as np
 from brakelab.arrays import Vector
 from brakelab.logs.signal_file import freshness_at_any_rate
 from brakelab.simulation.closed_loop import START_NS
-from brakelab.simulation.observer import with_observer
+from brakelab.simulation.configured import with_observer
 from brakelab.studies.entries.inputs import Inputs
 from brakelab.studies.entries.observer import Observer
 from ecu.algorithm.step import new_state, step

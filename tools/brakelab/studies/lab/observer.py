@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 from brakelab.identify.friction.trips import GENTLE, HIGH, LOW, MILD
 from brakelab.simulation.accuracy import friction_errors
 from brakelab.simulation.closed_loop import Drive
+from brakelab.simulation.configured import configured, shipped
 from brakelab.simulation.scenario import Phase, Scenario
 from brakelab.simulation.scenario_car import with_draw
 from brakelab.stretches import stretches
 from brakelab.studies.accuracy.observers import JOINT, ORDINARY, counted, drive_car
-from brakelab.studies.accuracy.observers_cases import Setup, configured, shipped
+from brakelab.studies.accuracy.observers_cases import Setup
 from brakelab.studies.study import WIDE
 from ecu.recording.learned_range import out_of_range
 from ecu.settings.config import new_params

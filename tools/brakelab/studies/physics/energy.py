@@ -7,9 +7,10 @@ from brakelab.plant.cycle import CYCLE
 from brakelab.plant.energy import Energy, energy
 from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import new_loop, run_blocks
+from brakelab.simulation.configured import configured
 from brakelab.simulation.scenario import load_scenario
 from brakelab.studies.study import Asked, Measured, Study
-from ecu.settings.config import Config, load_config
+from ecu.settings.config import Config
 from ecu.settings.resources import resource
 
 SUSPENDED: Final = "suv14"
@@ -79,7 +80,7 @@ TEXT: Final = (
 
 
 def _run(asked: Asked) -> Measured:
-    config = load_config(resource("config/suv.toml"))
+    config = configured()
     return Measured(energy_tables(resource("config/scenarios"), config))
 
 

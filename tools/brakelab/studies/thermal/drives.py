@@ -17,13 +17,12 @@ from brakelab.identify.thermal.reader import USED, ThermalLog, as_drive
 from brakelab.logs.physics.samples import KEPT
 from brakelab.plant.disc_nodes import heat_discs, nodes_like, wind
 from brakelab.simulation.closed_loop import Loop, new_loop, run_blocks
+from brakelab.simulation.configured import configured
 from brakelab.simulation.scenario import Scenario, Trace
 from brakelab.simulation.simulate import write_columns
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from brakelab.studies.wear.drives import trip_scenario
 from ecu.contract.signals import CORNERS, DISC_TEMPERATURE_MEASURED, INPUT_SIGNALS, OUTPUT
-from ecu.settings.config import load_config
-from ecu.settings.resources import resource
 
 GUST: Final = 3.0  # m/s along the car
 AIR_AT_WHEEL: Final = 2.0  # K: standard deviation of the air at the discs about that at the sensor, of a day
@@ -164,7 +163,7 @@ def write_log(path: Path, driven: Measured) -> None:
 
 def write_drives(folder: Path, seed: int, seconds: float = LONGEST_DRIVE) -> list[Path]:
     """Write a dry and a rainy trip of the SUV of a seed as `dry.parquet` and `rain.parquet`; return them."""
-    config = load_config(resource("config/suv.toml"))
+    config = configured()
     paths = []
     for number, (name, driver, air, wetness) in enumerate(WEATHER):
         path = folder / f"{name}.parquet"

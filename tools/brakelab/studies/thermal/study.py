@@ -17,12 +17,12 @@ from brakelab.identify.thermal.page import Judged
 from brakelab.identify.thermal.reader import ThermalLog
 from brakelab.identify.thermal.result import start_of
 from brakelab.simulation.closed_loop import new_loop
+from brakelab.simulation.configured import configured
 from brakelab.studies.thermal.drives import BEYOND_TOWN, Measured, drive_measured, measured_trip
 from ecu.algorithm.step import new_state
 from ecu.contract.records import RecordArray
 from ecu.recording.rest import cool_discs
-from ecu.settings.config import Axle, Config, load_config
-from ecu.settings.resources import resource
+from ecu.settings.config import Axle, Config
 
 NIGHT: Final = 10 * 3600.0  # s
 WHOLE: Final = 10_000.0
@@ -122,7 +122,7 @@ def _rms(errors: Array) -> Array:
 
 def drive_car(seed: int) -> Car:
     """Identify and judge the car of a seed."""
-    config = load_config(resource("config/suv.toml"))
+    config = configured()
     air = config.vehicle.ambient_temperature
     _, learned = _go(config, seed, 9, LEARNING, None)
     drives = []

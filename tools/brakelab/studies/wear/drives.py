@@ -13,13 +13,13 @@ from brakelab.plant.wear import RUN_IN, RUN_IN_MASS
 from brakelab.results.wear import HALF_WIDTH, PERIOD, regressors_of
 from brakelab.simulation.campaigns.wear_blocks import drawn_car
 from brakelab.simulation.closed_loop import Loop, new_loop, run_blocks
-from brakelab.simulation.scenario import Scenario, Trace, load_scenario
+from brakelab.simulation.configured import configured, shipped
+from brakelab.simulation.scenario import Scenario, Trace
 from brakelab.simulation.trip.generate import real_driving
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from ecu.algorithm.step import new_state
 from ecu.contract.signals import OUTPUT
-from ecu.settings.config import load_config, new_params
-from ecu.settings.resources import resource
+from ecu.settings.config import new_params
 
 DRIVERS: Final = {"calm": (0.95, 1.10, 5.0), "usual": (1.0, 1.0, 18.0), "lively": (1.08, 0.82, 30.0)}
 """Factors on speed and on time; ambient temperature [degC]."""
@@ -58,7 +58,7 @@ class CarDrives(NamedTuple):
 def trip_scenario(seed: int, driver: str) -> Scenario:
     """Return a trip driven by one of `DRIVERS`."""
     faster, slower, ambient = DRIVERS[driver]
-    base = load_scenario(resource("config/scenarios/real-driving.toml"))
+    base = shipped("real-driving")
     trip = real_driving(seed)
     t, speed = slower * trip.t, faster * trip.speed
     keep = np.unique(np.append(np.arange(0, len(t), EVERY), len(t) - 1))
@@ -113,7 +113,7 @@ def _part(driver: str, road: str, before: _Kept, after: _Kept) -> Part:
 
 def drive_car(seed: int) -> CarDrives:
     """Drive the car of a seed through one trip of every driver; the ECU keeps its learned values."""
-    config = load_config(resource("config/suv.toml"))
+    config = configured()
     law = new_params(config)[0]["wear_law"]
     lot = drawn_car(seed)
     parts, shares, learned = [], [], None

@@ -20,12 +20,12 @@ from brakelab.simulation.campaigns.wear_blocks import (
     drawn_car,
     programme,
 )
+from brakelab.simulation.configured import configured
 from brakelab.studies.wear.drives import CarDrives
 from ecu.algorithm.monitoring.wear import WEAR_STATE, restore_wear
 from ecu.contract.records import LEARNED, RecordArray, new_record
 from ecu.pads import GAUGE, add_measurement
-from ecu.settings.config import load_config, new_params
-from ecu.settings.resources import resource
+from ecu.settings.config import new_params
 
 LIFE_KM: Final = 30_000.0
 EVERY_KM: Final = 2_500.0
@@ -80,7 +80,7 @@ def measured_block(block: WornBlock, pad_mass: float, random: Generator) -> tupl
 
 def dynamometer_laws() -> dict[str, Law]:
     """Return the laws identified from blocks of another lot of linings, by `LAWS`."""
-    config = load_config(resource("config/suv.toml"))
+    config = configured()
     params = new_params(config)[0]
     car = drawn_car(DYNAMOMETER_CAR)
     fits: dict[str, list[Fit]] = {law: [] for law in LAWS}
@@ -127,7 +127,7 @@ def _appraise(params: RecordArray, learned: RecordArray) -> tuple[Array, Array]:
 def live(car: CarDrives, law_name: str, law: Law) -> Life:
     """Return thirty thousand kilometres of one car under a law of the dynamometer."""
     random = np.random.default_rng([car.seed, 31])
-    params = new_params(load_config(resource("config/suv.toml")))
+    params = new_params(configured())
     params[0]["wear_law"], params[0]["wear_sigma"] = law.coefficients, law.sigma
     records = {mode: new_record(LEARNED) for mode in MODES}
     for record in records.values():
