@@ -68,8 +68,9 @@ def drive():
 
 def proposed(frames, text: str) -> dict[str, Found]:
     database = cantools.database.load_string(text, "dbc")
-    found, drives = propose(read_series([frames], database))
-    assert drives
+    found, motion = propose(read_series([frames], database))
+    assert motion is not None
+    assert motion.drives
     return {one.target: one for one in found}
 
 
@@ -149,10 +150,10 @@ def test_real_cars_get_what_their_maps_say(car: str) -> None:
     if log is None:
         pytest.skip(f"no log of the {car} here")
     database = load_database(resource(f"dbc/cars/{car}.dbc"), strict=False)
-    found, drives = propose(read_series(read_frames(log, [], LogQuality()), database))
+    found, _ = propose(read_series(read_frames(log, [], LogQuality()), database))
     shipped_map = read_signal_map(resource(f"config/maps/{car}.toml")).inputs
     for one in found:
-        print(car, drives, one.target, one.series.name, one.factor, one.evidence)
+        print(car, one.target, one.series.name, one.factor, one.evidence)
     checked = 0
     for one in found:
         known = shipped_map.get(one.target)

@@ -196,8 +196,9 @@ def test_a_pause_of_the_recorder_changes_nothing():
     sensors = [series("YAW_RATE", -YAW, "deg/s"), series("LAT_ACCEL", LATERAL, "m/s2")]
     sensors += [series("STEER_ANGLE", ROAD.hand_wheel, "deg"), series("LONG_ACCEL", -ROAD.change, "m/s2")]
     whole, _ = propose([*ROAD.wheels.values(), *sensors])
-    jumped, drives = propose([paused(one, 1000.0) for one in (*ROAD.wheels.values(), *sensors)])
-    assert drives
+    jumped, motion = propose([paused(one, 1000.0) for one in (*ROAD.wheels.values(), *sensors)])
+    assert motion is not None
+    assert motion.drives
     assert [one.target for one in jumped] == [one.target for one in whole]
     assert [one.factor for one in jumped] == pytest.approx([one.factor for one in whole], rel=0.02)
 

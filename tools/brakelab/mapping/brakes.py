@@ -4,11 +4,11 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.logs.physics.line import BRAKING, MOVING, Fit, smooth
+from brakelab.logs.physics.line import BRAKING, MOVING, Fit
 from brakelab.logs.physics.pressures import OVERRUN
 from brakelab.logs.physics.samples import Car
 from brakelab.mapping.candidates import best_of, by_name, unit_of
-from brakelab.mapping.motion import Found, Motion, is_near, on_grid
+from brakelab.mapping.motion import Found, Motion
 from brakelab.mapping.names import converts, corner_of, score, tells_brake, tells_pressure
 from brakelab.mapping.series import Series
 from ecu.contract.signals import CORNERS
@@ -82,7 +82,7 @@ def _without_unit(each: list[Series], motion: Motion, car: Car) -> tuple[float, 
     unitless = "the database states no unit"
     if car.brakes is None:
         return 1.0, f"{unitless}, taken for bar: friction is off by its scale; --config CONFIG shows more"
-    pressures = np.stack([smooth(on_grid(one, motion.t)) for one in each], axis=1)
+    pressures = np.stack([motion.smoothed(one) for one in each], axis=1)
     braking = motion.faster(MOVING) & (motion.change < -BRAKING)
     released = motion.faster(MOVING) & (motion.change > 0.2)
     zero = np.median(pressures[released], axis=0) if released.any() else np.zeros(len(CORNERS))
@@ -103,7 +103,7 @@ def flags(series: list[Series], motion: Motion) -> list[Found]:
     found = []
     best: tuple[float, Series] | None = None
     for one in series:
-        on, known = on_grid(one, motion.t) > 0.5, motion.known & is_near(one, motion.t)
+        on, known = motion.values(one) > 0.5, motion.known & motion.near(one)
         if not one.flag or score(one.signal, "pedal_pressed") < 1 or not motion.drives:
             continue
         if known.any() and 0.01 < np.mean(on[known]) < 0.9:
@@ -130,5 +130,5 @@ def flags(series: list[Series], motion: Motion) -> list[Found]:
 
 def _is_slow(flag: Series, motion: Motion) -> bool:
     """Return whether the car is never faster than it reverses while the flag is on."""
-    on = (on_grid(flag, motion.t) > 0.5) & motion.known & is_near(flag, motion.t)
+    on = (motion.values(flag) > 0.5) & motion.known & motion.near(flag)
     return bool(motion.speed[on].max(initial=0.0) < BACKWARDS)

@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 
 from brakelab.arrays import Vector
-from brakelab.logs.physics.line import Fit, fit, smooth
+from brakelab.logs.physics.line import Fit, fit
 from brakelab.logs.physics.samples import Rows
-from brakelab.mapping.motion import Motion, contract_unit, is_near, on_grid
+from brakelab.mapping.motion import Motion, contract_unit
 from brakelab.mapping.names import converts, names_itself, score, tells_direction, tells_pressure
 from brakelab.mapping.series import Series, coarseness
 from ecu.bus.units import spelled
@@ -43,7 +43,7 @@ def best_of(
             continue
         if (unit == "%" and points < 1) or len(np.unique(one.value)) <= STEPS:
             continue
-        found = fit(smooth(on_grid(one, motion.t)), reference, rows & is_near(one, motion.t))
+        found = fit(motion.smoothed(one), reference, rows & motion.near(one))
         strength = found.correlation * fixed_sign if fixed_sign else abs(found.correlation)
         said = one.unit.strip() or unit == "%" or (unit == "bar" and tells_pressure(one.message, one.signal))
         named = points > 0 and said

@@ -17,7 +17,7 @@ from brakelab.logs.physics.samples import ANY_CAR, Car, car_of
 from brakelab.mapping.columns import column_map_text, read_column_series
 from brakelab.mapping.drive_torque import motors
 from brakelab.mapping.map_text import input_lines, needs_radius, radius_line
-from brakelab.mapping.motion import Found, motion_of, speeds, wheel_speeds
+from brakelab.mapping.motion import Found, wheel_speeds
 from brakelab.mapping.names import COUNTING, converts, words
 from brakelab.mapping.physics import propose
 from brakelab.mapping.series import Series, read_series
@@ -72,15 +72,13 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
         series = read_series(read_frames(log, interfaces, findings.log, advance), database)
     for line in damage_lines(findings):
         say(line)
-    found, drives = propose(series, car)
-    if not found:
+    found, motion = propose(series, car)
+    if motion is None:
         raise UserError(str(dbc), "", f"names no speed in {log}; give the database of this car")
     _refuse_unitless(dbc, found[0].series, "give it there", car)
     bus = found[0].series.bus
     here = [one for one in series if one.bus == bus]
     hints: list[str] = []
-    sent = speeds(series)
-    motion = motion_of(sent, car)
     if not any(one.target.startswith("calliper_pressure") for one in found):
         torque = brake_torque(here, motion)
         if torque and params is not None:
@@ -89,13 +87,14 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
             name = f"{torque[0].message}.{torque[0].signal} [{torque[0].unit}]"
             remedy = f"a brake torque can stand in for pressures, {FORMULA}; --config CONFIG writes it"
             hints = [f"{name} follows the deceleration: {remedy}"]
-    if len(sent) > 1 and not any(one.target.startswith("motor_torque") for one in found):
-        found += motors(here, wheel_speeds(series), motion)
+    wheels = wheel_speeds(series)
+    if wheels and not any(one.target.startswith("motor_torque") for one in found):
+        found += motors(here, wheels, motion)
     strict = not any(one.series.message in overlapping for one in found)
     others = other_sources(found, here, motion, car)
     comments = [*hints, *map(str, others)]
     text = map_text(found, here, (out or Path("map.toml")), dbc, strict, interfaces, bus, comments, car)
-    _show(found, drives, others)
+    _show(found, motion.drives, others)
     for line in hints + _warnings(found):
         say(line)
     if written := _written(text, out):
@@ -118,14 +117,14 @@ def _suggest_columns(log: Path, out: Path | None, car: Car) -> int:
     """Propose a map of the columns of a signal file, as `suggest` does of frames."""
     quality = SignalQuality()
     columns, series = read_column_series(log, quality)
-    found, drives = propose(series, car)
-    if not found:
+    found, motion = propose(series, car)
+    if motion is None:
         among = f"no speed by its name and unit among {', '.join(columns.names[:SHOWN])}"
         raise UserError(str(log), "", f"{among}; write the map by hand (docs/signal-maps.md)")
     wheel = found[0].series
     _refuse_unitless(log, wheel, f'write it behind the names: "{wheel.signal} [km/h]"', car)
-    others = other_sources(found, series, motion_of(speeds(series), car), car)
-    _show(found, drives, others)
+    others = other_sources(found, series, motion, car)
+    _show(found, motion.drives, others)
     for line in _warnings(found):
         say(line)
     after = {one.target: timeout(one) for one in found}

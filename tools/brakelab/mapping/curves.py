@@ -14,10 +14,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.arrays import Vector
-from brakelab.logs.physics.line import LAGS, MOVING, RATE, smooth
+from brakelab.logs.physics.line import LAGS, MOVING, RATE
 from brakelab.logs.physics.samples import Car, Rows
 from brakelab.mapping.candidates import best_of, unit_of
-from brakelab.mapping.motion import STANDING, Found, Motion, contract_unit, is_near, on_grid
+from brakelab.mapping.motion import STANDING, Found, Motion, contract_unit
 from brakelab.mapping.scale import scale_of
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS
@@ -90,7 +90,7 @@ def curves(series: list[Series], motion: Motion, car: Car, taken: set[str]) -> l
 def _values(one: Found, motion: Motion) -> Vector:
     """Return a found input in the contract's unit on the grid."""
     scale = CONVERSIONS[contract_unit(one.target)][one.unit][0]
-    return (smooth(on_grid(one.series, motion.t)) * one.factor + one.offset) * scale
+    return (motion.smoothed(one.series) * one.factor + one.offset) * scale
 
 
 def _yaw_rate(series: list[Series], motion: Motion, fast: Rows, taken: set[str]) -> Found | None:
@@ -100,8 +100,8 @@ def _yaw_rate(series: list[Series], motion: Motion, fast: Rows, taken: set[str])
     if not known:
         return None
     (one, line), wheels = max(known, key=lambda each: abs(each[0][1].correlation))
-    signal = smooth(on_grid(one, motion.t))
-    slow = at_rest(wheels, signal, motion.speed, fast & is_near(one, motion.t))
+    signal = motion.smoothed(one)
+    slow = at_rest(wheels, signal, motion.speed, fast & motion.near(one))
     slope = 1.0 / slow.slope if slow else line.slope
     where = " at low speed" if slow else ""
     unit = unit_of("yaw_rate", one, slope)
@@ -110,7 +110,7 @@ def _yaw_rate(series: list[Series], motion: Motion, fast: Rows, taken: set[str])
     evidence = (
         f"against right less left wheels: correlation {abs(line.correlation):.2f}, slope {slope:+.2f}{where}"
     )
-    stood = (motion.speed < STANDING) & motion.known & is_near(one, motion.t)
+    stood = (motion.speed < STANDING) & motion.known & motion.near(one)
     zero = float(np.median(signal[stood])) if stood.sum() > LEAST_STOOD else line.intercept
     return _with_zero("yaw_rate", one, scale.factor, unit, zero, evidence, scale.warning)
 
@@ -123,11 +123,11 @@ def _accel_y(
     if best is None:
         return None
     one, line = best
-    signal = smooth(on_grid(one, motion.t))
+    signal = motion.smoothed(one)
     slope, where, slow = line.slope, "", None
     if yaw_rate is motion.yaw_rates[0]:  # the wheels', which tyres pressed flat disturb
         turns = (signal - line.intercept) / np.maximum(motion.speed, MOVING)
-        slow = at_rest(yaw_rate, turns, motion.speed, fast & is_near(one, motion.t))
+        slow = at_rest(yaw_rate, turns, motion.speed, fast & motion.near(one))
         if slow:
             slope, where = 1.0 / slow.slope, " at low speed"
     unit = unit_of("accel_y", one, slope)
@@ -163,7 +163,7 @@ def _steering(
     if best is None:
         return None
     one, line = best
-    signal, fast = smooth(on_grid(one, motion.t)), fast & is_near(one, motion.t)
+    signal, fast = motion.smoothed(one), fast & motion.near(one)
     unit = unit_of("steering_angle", one, line.slope)
     if power:
         turns = yaw_rate * speed ** (power - 1)

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from brakelab.logs.physics.line import BRAKING, MOVING, Fit, fit, smooth
-from brakelab.mapping.motion import Found, Motion, is_near, on_grid
+from brakelab.mapping.motion import Found, Motion
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
@@ -37,7 +37,7 @@ def drive_torque(series: list[Series], motion: Motion) -> tuple[Series, Fit] | N
         parts = set(words(one.signal))
         if one.flag or not converts(one.unit, "N m") or not parts & WHEEL or parts & (BRAKES | ASKED):
             continue
-        line = fit(smooth(on_grid(one, motion.t)), motion.change, rows & is_near(one, motion.t))
+        line = fit(motion.smoothed(one), motion.change, rows & motion.near(one))
         scaled = line.slope * CONVERSIONS["N m"][spelled(one.unit)][0]
         if line.correlation > FOLLOWS and PER_TORQUE[0] < scaled < PER_TORQUE[1]:
             found.append((line.correlation, one, line))
@@ -46,8 +46,8 @@ def drive_torque(series: list[Series], motion: Motion) -> tuple[Series, Fit] | N
 
 def driven_wheels(torque: Series, wheels: dict[str, Series], motion: Motion) -> tuple[tuple[float, ...], str]:
     """Return the share of each wheel in the torque, in the order of CORNERS, and the evidence for it."""
-    drive = smooth(on_grid(torque, motion.t))
-    fl, fr, rl, rr = (smooth(np.abs(on_grid(wheels[corner], motion.t))) for corner in CORNERS)
+    drive = motion.smoothed(torque)
+    fl, fr, rl, rr = (smooth(np.abs(motion.values(wheels[corner]))) for corner in CORNERS)
     rows = motion.faster(MOVING)
     ahead = (rl + rr - fl - fr)[rows] / np.maximum(fl + fr, 1e-6)[rows]
     if rows.sum() < 2 or ahead.std() == 0.0 or drive[rows].std() == 0.0:

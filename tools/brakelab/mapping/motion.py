@@ -46,6 +46,8 @@ class Motion(NamedTuple):
     """rad/s, positive to the left; of both axles, the front and the rear one; 0 by one speed"""
     known: Rows
     """Where samples of all wheels are near."""
+    cache: dict[int, tuple[Series, Vector]]
+    """What `smoothed` was given and returned, by the identity of the values."""
 
     @property
     def drives(self) -> bool:
@@ -56,22 +58,35 @@ class Motion(NamedTuple):
         """Return where the car is known to be faster than `speed` [m/s]."""
         return (self.speed > speed) & self.known
 
+    def values(self, series: Series) -> Vector:
+        """Return a series on the grid, straight lines between its samples."""
+        return _on_grid(series, self.t)
+
+    def smoothed(self, series: Series) -> Vector:
+        """Return a series on the grid, smoothed."""
+        key = id(series.value)
+        if key not in self.cache:
+            self.cache[key] = series, smooth(self.values(series))
+        return self.cache[key][1]
+
+    def near(self, series: Series) -> Rows:
+        """Return where the grid has samples of a series before and after it, not far away."""
+        return _is_near(series, self.t)
+
 
 def contract_unit(target: str) -> str:
     """Return the contract's unit of an input."""
     return INPUT_SIGNALS[INPUT[target]].unit
 
 
-def on_grid(series: Series, t: Vector) -> Vector:
-    """Return the series on the grid `t` [s], straight lines between its samples."""
+def _on_grid(series: Series, t: Vector) -> Vector:
     known = np.isfinite(series.value)
     if not known.any():
         return np.full(len(t), np.nan)
     return np.interp(t, series.t[known], series.value[known])
 
 
-def is_near(series: Series, t: Vector) -> Rows:
-    """Return where the grid `t` [s] has samples of the series before and after it, not far away."""
+def _is_near(series: Series, t: Vector) -> Rows:
     times = series.t[np.isfinite(series.value)]
     if len(times) < 2:
         return np.zeros(len(t), np.bool_)
@@ -148,10 +163,10 @@ def motion_of(found: dict[str, Series], car: Car = ANY_CAR) -> Motion:
     end = min(one.t[-1] for one in found.values())
     t = np.arange(start, end, 1.0 / RATE)
     metres = _metres_per_second(next(iter(found.values())), float(car.radius.mean()))
-    each = [smooth(np.abs(metres(on_grid(one, t)))) for one in found.values()]
+    each = [smooth(np.abs(metres(_on_grid(one, t)))) for one in found.values()]
     speed = np.mean(each, axis=0)
     fl, fr, rl, rr = each if len(each) == len(CORNERS) else each * len(CORNERS)
     front, rear = (fr - fl) / car.track, (rr - rl) / car.track
-    known = np.logical_and.reduce([is_near(one, t) for one in found.values()])
+    known = np.logical_and.reduce([_is_near(one, t) for one in found.values()])
     change = np.where(known, np.gradient(speed, 1.0 / RATE), 0.0)
-    return Motion(t, speed, change, (0.5 * (front + rear), front, rear), known)
+    return Motion(t, speed, change, (0.5 * (front + rear), front, rear), known, {})

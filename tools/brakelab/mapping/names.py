@@ -6,30 +6,24 @@ from typing import Final
 from ecu.bus.units import CONVERSIONS, spelled
 from ecu.contract.signals import without_corner
 
-_CORNERS: Final = (
-    (
-        "fl",
-        ("fl", "lf", "frontleft", "leftfront", "frtlft", "lftfrt", "frl", "vl", "vornelinks", "lhf", "flh"),
-    ),
-    (
+_CORNERS: Final = {
+    "fl": ["fl", "lf", "frontleft", "leftfront", "frtlft", "lftfrt", "frl", "vl", "vornelinks", "lhf", "flh"],
+    "fr": [
         "fr",
-        (
-            "fr",
-            "rf",
-            "frontright",
-            "rightfront",
-            "frtrght",
-            "rghtfrt",
-            "frr",
-            "vr",
-            "vornerechts",
-            "rhf",
-            "frh",
-        ),
-    ),
-    ("rl", ("rl", "lr", "rearleft", "leftrear", "rrlft", "lftrr", "rel", "hl", "hintenlinks", "lhr", "rlh")),
-    ("rr", ("rr", "rearright", "rightrear", "rrrght", "rghtrr", "rer", "hr", "hintenrechts", "rhr", "rrh")),
-)
+        "rf",
+        "frontright",
+        "rightfront",
+        "frtrght",
+        "rghtfrt",
+        "frr",
+        "vr",
+        "vornerechts",
+        "rhf",
+        "frh",
+    ],
+    "rl": ["rl", "lr", "rearleft", "leftrear", "rrlft", "lftrr", "rel", "hl", "hintenlinks", "lhr", "rlh"],
+    "rr": ["rr", "rearright", "rightrear", "rrrght", "rghtrr", "rer", "hr", "hintenrechts", "rhr", "rrh"],
+}
 """Spellings of a corner: English in either order, German (vorn/hinten, links/rechts)."""
 
 WORDS: Final = {
@@ -40,16 +34,7 @@ WORDS: Final = {
     "yaw_rate": ("yaw", "gier", "yawrate", "rate"),
     "steering_angle": ("steer", "steering", "sas", "stw", "lenk", "lrw", "pinion", "angle", "whl"),
     "calliper_pressure": (
-        "press",
-        "pressure",
-        "pres",
-        "prs",
-        "cyl",
-        "brk",
-        "brake",
-        "mc",
-        "druck",
-        "bremsdruck",
+        *("press", "pressure", "pres", "prs", "cyl", "brk", "brake", "mc", "druck", "bremsdruck"),
     ),
     "pedal_pressed": ("brake", "brk", "bped", "pedal", "pressed", "press", "appl", "drv", "brems"),
     "pedal_position": ("brake", "brk", "bped", "pedal", "pedl", "stroke", "trvl", "position"),
@@ -74,19 +59,8 @@ AGAINST: Final = {
     "yaw_rate": ("offset", "accel", "steer", "sas", *_ASKED),
     "calliper_pressure": (
         *("oil", "tire", "tyre", "fuel", "booster", "bstr", "vacuum", "vac", "turbo", "rail", "ac"),
-        *(
-            "gradient",
-            "torque",
-            "pedal",
-            "position",
-            "pos",
-            "stroke",
-            "travel",
-            "trvl",
-            "light",
-            "switch",
-            *_ASKED,
-        ),
+        *("gradient", "torque", "pedal", "position", "pos", "stroke", "travel", "trvl", "light", "switch"),
+        *_ASKED,
     ),
     "accelerator_position": ("brake", "brk", "accel_x", "long", "lat", "inverted"),
     "pedal_position": ("accelerator", "gas", "throttle", "clutch", "aped", "pressure", "torque"),
@@ -112,7 +86,7 @@ def corner_of(name: str) -> tuple[str, str]:
     for length in (2, 1):
         for place in range(len(parts) - length + 1):
             joined = "".join(parts[place : place + length])
-            for corner, spellings in _CORNERS:
+            for corner, spellings in _CORNERS.items():
                 if joined in spellings:
                     return corner, "_".join(parts[:place] + parts[place + length :])
     return "", "_".join(parts)
@@ -120,23 +94,20 @@ def corner_of(name: str) -> tuple[str, str]:
 
 def score(name: str, target: str) -> float:
     """Return how much a name speaks for an input: words found less words against it."""
-    parts = words(name)
-    stem = without_corner(target)
+    stem, parts = without_corner(target), words(name)
+    said, against = (sum(_speaks(parts, word) for word in of.get(stem, ())) for of in (WORDS, AGAINST))
+    return float(said - 3 * against)
 
-    def speaks(word: str) -> bool:
-        return any(part == word or (len(word) > 3 and part.startswith(word)) for part in parts)
 
-    return float(sum(map(speaks, WORDS[stem])) - 3 * sum(map(speaks, AGAINST.get(stem, ()))))
+def _speaks(parts: list[str], word: str) -> bool:
+    return any(part == word or (len(word) > 3 and part.startswith(word)) for part in parts)
 
 
 def tells_direction(name: str, target: str) -> bool:
     """Return whether a name says which of two accelerations it is; True of other inputs."""
     if not target.startswith("accel_"):
         return True
-    own = [word for word in WORDS[target] if word != "accel"]
-    return any(
-        part == word or (len(word) > 3 and part.startswith(word)) for part in words(name) for word in own
-    )
+    return any(_speaks(words(name), word) for word in WORDS[target] if word != "accel")
 
 
 def tells_pressure(message: str, signal: str) -> bool:

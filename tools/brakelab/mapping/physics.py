@@ -83,14 +83,14 @@ def _curved(motion: Motion) -> bool:
     return bool((motion.speed * motion.yaw_rates[0])[fast].std() > LEAST_CURVES)
 
 
-def propose(series: list[Series], car: Car = ANY_CAR) -> tuple[list[Found], bool]:
-    """Return what is proposed, speeds first, and whether the car drove; empty without wheel speeds and speed.
+def propose(series: list[Series], car: Car = ANY_CAR) -> tuple[list[Found], Motion | None]:
+    """Return what is proposed, speeds first, and the car's motion; nothing without wheel speeds and speed.
 
     All of it comes from the bus that carries the speeds. `car` gives lengths and brakes, where known.
     """
     sent = speeds(series)
     if not sent:
-        return [], False
+        return [], None
     motion = motion_of(sent, car)
     bus = next(iter(sent.values())).bus
     here = [one for one in series if one.bus == bus]
@@ -112,4 +112,4 @@ def propose(series: list[Series], car: Car = ANY_CAR) -> tuple[list[Found], bool
     own = {one.target: one for one in _named_as_inputs(here)}
     sure = {one.target for one in found if one.sure}
     kept = [one for one in found if one.sure or one.target not in own]
-    return kept + [one for target, one in own.items() if target not in sure], motion.drives
+    return kept + [one for target, one in own.items() if target not in sure], motion

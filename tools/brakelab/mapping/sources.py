@@ -5,10 +5,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.arrays import Vector
-from brakelab.logs.physics.line import MOVING, RATE, fit, smooth
+from brakelab.logs.physics.line import MOVING, RATE, fit
 from brakelab.logs.physics.samples import Car, Rows
 from brakelab.mapping.candidates import LEAST_CORRELATION, PER_WORD, STEPS
-from brakelab.mapping.motion import Found, Motion, contract_unit, is_near, on_grid
+from brakelab.mapping.motion import Found, Motion, contract_unit
 from brakelab.mapping.names import (
     CHECKING,
     COUNTING,
@@ -67,14 +67,14 @@ def alternatives(found: list[Found], series: list[Series], motion: Motion) -> li
         if one.series.flag or not one.sure or one.target[-3:] in ("_fr", "_rl", "_rr"):
             continue
         corner = corner_of(one.series.signal)[0]
-        own = smooth(on_grid(one.series, motion.t))
+        own = motion.smoothed(one.series)
         for other in series:
             if other.name in used or other.flag or corner_of(other.signal)[0] != corner:
                 continue
             if not _same_quantity(one.series, other, contract_unit(one.target)):
                 continue
-            rows = motion.known & is_near(other, motion.t)
-            correlation = abs(fit(smooth(on_grid(other, motion.t)), own, rows).correlation)
+            rows = motion.known & motion.near(other)
+            correlation = abs(fit(motion.smoothed(other), own, rows).correlation)
             if correlation >= SAME:
                 sources.append(Source(one.target, other, _compared(one.series, other, correlation)))
     return sorted(sources, key=lambda source: (source.target, coarseness(source.series)))
@@ -137,10 +137,10 @@ def _looked_at(
         return likely - 1.0, one, f"only {values} value{'s' if values > 1 else ''} in this drive"
     if one.unit.strip() and not fits:
         return likely, one, f"by its name, but {one.unit} does not turn into {unit}"
-    rows = reference.rows & is_near(one, motion.t)
+    rows = reference.rows & motion.near(one)
     if rows.sum() < ENOUGH:
         return (likely, one, "by its name, but the car hardly drives in this log") if points >= 1 else None
-    correlation = fit(smooth(on_grid(one, motion.t)), reference.values, rows).correlation
+    correlation = fit(motion.smoothed(one), reference.values, rows).correlation
     strength = correlation * reference.sign if reference.sign else abs(correlation)
     if points < 1 and strength < LEAST_CORRELATION:
         return None

@@ -12,8 +12,8 @@ from typing import Any, Final
 import numpy as np
 
 from brakelab.arrays import Vector
-from brakelab.logs.physics.line import BRAKING, Fit, fit, smooth
-from brakelab.mapping.motion import Found, Motion, is_near, on_grid
+from brakelab.logs.physics.line import BRAKING, Fit, fit
+from brakelab.mapping.motion import Found, Motion
 from brakelab.mapping.names import converts, words
 from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS, spelled
@@ -37,7 +37,7 @@ def brake_torque(series: list[Series], motion: Motion) -> tuple[Series, Fit] | N
         parts = set(words(one.signal))
         if one.flag or not converts(one.unit, "N m") or not parts & {"brk", "brake", "brakes", "bremse"}:
             continue
-        line = fit(smooth(on_grid(one, motion.t)), decel, motion.faster(1.0) & is_near(one, motion.t))
+        line = fit(motion.smoothed(one), decel, motion.faster(1.0) & motion.near(one))
         if line.correlation > FOLLOWS:
             found.append((line.correlation + (NEAR if parts & MEASURED else 0.0), one, line))
     return max(found, key=lambda candidate: candidate[0])[1:] if found else None
