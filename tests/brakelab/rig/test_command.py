@@ -82,6 +82,7 @@ def test_a_rig_fails_by_a_limit_that_is_not_kept(
     assert ("FAILED: stopping distance at most 1 m (found: " in row["failed"]) == bool(code)
     assert (out / "stop" / "report.html").exists()
     page = (out / "rig.html").read_text("utf-8")
+    assert "<script" not in page
     assert page.count("<b>failed</b>") == code
     assert ("1 of 2 failed" in page) == bool(code)
 

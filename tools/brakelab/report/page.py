@@ -101,7 +101,10 @@ def fill(
     content: Mapping[str, Any],
     template: Traversable = PAGE,
 ) -> str:
-    """Return the page; `plots` maps the template's places to figures by name, `content` is the rest."""
+    """Return the page; `plots` maps the template's places to figures by name, `content` is the rest.
+
+    A page without figures runs no script.
+    """
     figures = {name: plot for group in plots.values() for name, plot in group.items()}
     script, divs = embed(figures)
     here = files("brakelab.report")
@@ -112,7 +115,7 @@ def fill(
             css=(here / "page.css").read_text("utf-8"),
             js=(here / "page.js").read_text("utf-8"),
             dark=json.dumps(DARK),
-            bokeh=Resources(mode="inline", components=["bokeh"]).render(),
+            bokeh=Resources(mode="inline", components=["bokeh"]).render() if figures else "",
             script=script,
             **{
                 place: [{"div": divs[name], "height": plot.height} for name, plot in group.items()]

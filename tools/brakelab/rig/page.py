@@ -3,15 +3,14 @@
 import math
 from importlib.resources import files
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from jinja2 import Environment, StrictUndefined
 from rich.table import Table
 
-from brakelab.report.page import fixed, percent, signed_percent
+from brakelab.report.page import Tile, fill, fixed, percent, signed_percent
 from brakelab.rig.live import Bus
 from brakelab.rig.outcome import Outcome
 from brakelab.rig.reaction import Reaction
@@ -95,27 +94,17 @@ def write_tables(outcomes: list[Outcome], out: Path) -> None:
         pq.write_table(pa.Table.from_pylist(injected), out / "faults.parquet")
 
 
-class Tile(NamedTuple):
-    """A figure of all scenarios."""
-
-    name: str
-    value: str
-    unit: str
-    note: str
-    warns: bool
-
-
 def _tiles(outcomes: list[Outcome], live: bool) -> list[Tile]:
     disturbed = sum(bool(one.reactions) for one in outcomes)
-    tiles = [Tile("Scenarios", str(len(outcomes)), "", f"{disturbed} with injected faults", False)]
+    tiles = [Tile("Scenarios", str(len(outcomes)), "", f"{disturbed} with injected faults")]
     worst = max(outcomes, key=lambda one: np.nan_to_num(one.decel_error, nan=-1.0))
     if not math.isnan(worst.decel_error):
         note = f"largest in settled braking: {worst.scenario}"
-        tiles.append(Tile("Deceleration error", fixed(worst.decel_error, 2), "m/s²", note, False))
+        tiles.append(Tile("Deceleration error", fixed(worst.decel_error, 2), "m/s²", note))
     longest = max(outcomes, key=lambda one: np.nan_to_num(one.longer, nan=-1.0))
     if not math.isnan(longest.longer):
         more = signed_percent(longest.longer, 1)
-        tiles.append(Tile("Stopping distance", more, "%", f"longest by faults: {longest.scenario}", False))
+        tiles.append(Tile("Stopping distance", more, "%", f"longest by faults: {longest.scenario}"))
     count = sum(len(one.unexplained) for one in outcomes)
     note = "by no injected fault"
     tiles.append(Tile("Unexplained faults", str(count), "", note, count > 0))
@@ -133,19 +122,15 @@ def _tiles(outcomes: list[Outcome], live: bool) -> list[Tile]:
 
 def write_page(outcomes: list[Outcome], bus: Bus | None, config: Config, cars: str, seed: int) -> str:
     """Return the page, of the simulated `cars`; it needs no other file but links to reports beside it."""
-    page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    page.filters.update(fixed=fixed, percent=percent, signed_percent=signed_percent)
-    source = (files("brakelab.rig") / "page.html.j2").read_text("utf-8")
-    return page.from_string(source).render(
-        css=(files("brakelab.report") / "page.css").read_text("utf-8"),
-        outcomes=outcomes,
-        tiles=_tiles(outcomes, bus is not None),
-        bits_text=bits_text,
-        passed_text=passed_text,
-        by_the_car=by_the_car(outcomes),
-        live=bus is not None,
-        controller=bus is not None and bus.wire is not None,
-        facts=[
+    content = {
+        "outcomes": outcomes,
+        "tiles": _tiles(outcomes, bus is not None),
+        "bits_text": bits_text,
+        "passed_text": passed_text,
+        "by_the_car": by_the_car(outcomes),
+        "live": bus is not None,
+        "controller": bus is not None and bus.wire is not None,
+        "facts": [
             ("Vehicle", config.name),
             ("Simulated car", cars),
             ("Configuration", config_hash(config)[:12]),
@@ -154,5 +139,6 @@ def write_page(outcomes: list[Outcome], bus: Bus | None, config: Config, cars: s
             ("Bus", bus.why if bus else "in memory, lock-step"),
             ("brake-ecu", __version__),
         ],
-        isinf=math.isinf,
-    )
+        "isinf": math.isinf,
+    }
+    return fill({}, content, files("brakelab.rig") / "page.html.j2")
