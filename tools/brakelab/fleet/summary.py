@@ -10,8 +10,9 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from brakelab.replay.quality import Findings
+from brakelab.replay.summary import errors_of, judged
 from brakelab.results.brakes import LEARNED, BrakeBook, BrakeRow
-from brakelab.results.prediction import corners, errors
+from brakelab.results.prediction import corners
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS, CYCLE_NS, HOLDING, OBSERVING, OUTPUT
 
@@ -78,11 +79,7 @@ class DriveBook:
         """Return the columns derived from the rows and the logs."""
         brakings = self.brakes.rows
         applications = [brakings[k : k + 4] for k in range(0, len(brakings), len(CORNERS))]
-        counted = [four for four in applications if not four[0].left_out]
-        found = errors(
-            [four[0].specific_force_mean for four in counted],
-            [four[0].specific_force_predicted for four in counted],
-        )
+        found = errors_of(judged(brakings))
         return {
             "start_time": findings[0].began_ns,
             "duration": self._rows * _PERIOD,

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from brakelab.results.brakes import LEARNED, BrakeRow
 from brakelab.results.prediction import SHORT, Errors, Vector, errors, one_scale, running_average
+from brakelab.results.text_table import cell
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.contract.signals import CORNERS
 
@@ -36,10 +37,10 @@ def brakings_table(rows: Sequence[BrakeRow], nominal: Sequence[float]) -> Table:
         table.add_row(
             f"{one.t_start:.2f}",
             f"{one.duration:.2f}",
-            f"{_number(3.6 * one.v_in, 0)} → {_number(3.6 * one.v_end, 0)}",
-            _number(one.specific_force_mean, 2),
-            f"{_number(one.specific_force_predicted, 2)} ± {_number(one.sigma_specific_force, 2)}",
-            _number(one.specific_force_configured, 2),
+            f"{cell(3.6 * one.v_in, '.0f')} → {cell(3.6 * one.v_end, '.0f')}",
+            cell(one.specific_force_mean, ".2f"),
+            f"{cell(one.specific_force_predicted, '.2f')} ± {cell(one.sigma_specific_force, '.2f')}",
+            cell(one.specific_force_configured, ".2f"),
             _friction(corners[:2], nominal[:2]),
             _friction(corners[2:], nominal[2:]),
             _verdict(corners),
@@ -62,21 +63,29 @@ def taps(rows: Sequence[BrakeRow]) -> int:
     return sum(row.duration < SHORT for row in rows[:: len(CORNERS)])
 
 
+def judged(rows: Sequence[BrakeRow]) -> list[BrakeRow]:
+    """Return a row of each application of `rows` whose prediction counts."""
+    return [row for row in rows[:: len(CORNERS)] if not row.left_out]
+
+
+def errors_of(rows: Sequence[BrakeRow], predicted: str = "specific_force_predicted") -> Errors:
+    """Return how far the column `predicted` was off in `rows`, one of each application."""
+    return errors([row.specific_force_mean for row in rows], [getattr(row, predicted) for row in rows])
+
+
 def prediction_errors(rows: Sequence[BrakeRow]) -> Errors | None:
     """Return how far the predictions of the applications in `rows` were off, None: none counts."""
-    counted = [row for row in rows[:: len(CORNERS)] if not row.left_out]
-    measured = [row.specific_force_mean for row in counted]
-    return errors(measured, [row.specific_force_predicted for row in counted]) if counted else None
+    counted = judged(rows)
+    return errors_of(counted) if counted else None
 
 
 def prediction_lines(rows: Sequence[BrakeRow]) -> list[str]:
     """Return how far the predictions of the applications in `rows` were off, and which do not count."""
-    ones = rows[:: len(CORNERS)]
-    counted = [row for row in ones if not row.left_out]
+    counted = judged(rows)
     measured = [row.specific_force_mean for row in counted]
     lines = ["prediction: no braking to judge it by"]
     if counted:
-        found = errors(measured, [row.specific_force_predicted for row in counted])
+        found = errors_of(counted)
         lines = [
             f"prediction of {found.counted} braking{'s' if found.counted > 1 else ''}: "
             f"off by {100 * found.mean:.1f} % on the mean, "
@@ -86,14 +95,11 @@ def prediction_lines(rows: Sequence[BrakeRow]) -> list[str]:
                 f"{name} {100 * errors(measured, other).mean:.1f} %" for name, other in peers(counted).items()
             ),
         ]  # fmt: skip
-    why = Counter(row.left_out for row in ones if row.left_out)
-    if not why:
-        return lines
-    return [
-        *lines,
-        "left out of the prediction: "
-        + ", ".join(f"{count} {reason}" for reason, count in why.most_common()),
-    ]
+    why = Counter(row.left_out for row in rows[:: len(CORNERS)] if row.left_out)
+    if why:
+        reasons = ", ".join(f"{count} {reason}" for reason, count in why.most_common())
+        lines.append(f"left out of the prediction: {reasons}")
+    return lines
 
 
 def peers(rows: Sequence[BrakeRow]) -> dict[str, Vector]:
@@ -108,10 +114,6 @@ def peers(rows: Sequence[BrakeRow]) -> dict[str, Vector]:
     }
 
 
-def _number(value: float, digits: int) -> str:
-    return "–" if math.isnan(value) else f"{value:.{digits}f}"
-
-
 def _friction(corners: Sequence[BrakeRow], nominal: Sequence[float]) -> str:
     mean = sum(row.mu_b_end for row in corners) / len(corners)
     sigma = sum(row.sigma_mu_b_end for row in corners) / len(corners)
@@ -120,7 +122,7 @@ def _friction(corners: Sequence[BrakeRow], nominal: Sequence[float]) -> str:
         for row, usual in zip(corners, nominal, strict=True)
         for ratio in (LEAST_RATIO, GREATEST_RATIO)
     )
-    return f"{_number(mean, 3)} ± {_number(sigma, 3)}{' at its bound' if bounded else ''}"
+    return f"{cell(mean, '.3f')} ± {cell(sigma, '.3f')}{' at its bound' if bounded else ''}"
 
 
 def _verdict(corners: Sequence[BrakeRow]) -> str:

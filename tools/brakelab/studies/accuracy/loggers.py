@@ -17,7 +17,7 @@ from brakelab.plant.description import Engine
 from brakelab.replay.drive import replay_drive
 from brakelab.replay.quality import Findings
 from brakelab.replay.source import load_source
-from brakelab.replay.summary import peers
+from brakelab.replay.summary import errors_of, judged, peers
 from brakelab.results.brakes import BrakeBook, BrakeRow
 from brakelab.results.prediction import corners, errors
 from brakelab.results.processes import run_each
@@ -113,8 +113,8 @@ def logger_columns(drive: Drive, logger: Logger) -> dict[str, Vector]:
     return columns
 
 
-def _replay(drive: Drive, logger: Logger, config: Config) -> tuple[Vector, list[BrakeRow]]:
-    """Return rows of results, shape (n, N_ROW), and the applications of a bystander's replay."""
+def replayed(t: Vector, columns: dict[str, Vector], config: Config) -> tuple[Vector, list[BrakeRow]]:
+    """Return rows of results, shape (n, N_ROW), and the applications of a bystander's replay of signals."""
     params, rows = new_params(config), []
     book = BrakeBook(params)
 
@@ -124,19 +124,18 @@ def _replay(drive: Drive, logger: Logger, config: Config) -> tuple[Vector, list[
 
     with TemporaryDirectory(prefix="brake-ecu-loggers-") as folder:
         path = Path(folder, "drive.parquet")
-        write_columns(path, drive.t, logger_columns(drive, logger), {})
+        write_columns(path, t, columns, {})
         replay_drive([Findings(path)], params, None, load_source(None), write, book.end_log, lambda _: None)
     return np.concatenate(rows), book.rows
 
 
 def _judge(drive: Drive, rows: Vector, found: list[BrakeRow], config: Config) -> Recorded:
-    applications = found[:: len(CORNERS)]
     true = np.stack([drive.truth[f"mu_b_{corner}"] for corner in CORNERS], axis=1)
     pressure = np.stack([drive.truth[f"calliper_pressure_{corner}"] for corner in CORNERS], axis=1)
     p: Any = new_params(config)[0]
     lever = p["piston_area"] * p["effective_radius"] / p["wheel_radius"]
     sums, inside = [], []
-    counted = [row for row in applications if not row.left_out][FIRST:]
+    counted = judged(found)[FIRST:]
     for application in counted:
         at = int(np.searchsorted(drive.t, application.t_start))
         last = int(np.searchsorted(drive.t, application.t_start + application.duration))
@@ -146,12 +145,11 @@ def _judge(drive: Drive, rows: Vector, found: list[BrakeRow], config: Config) ->
         sums.append(abs(float(weight @ mu) / float(weight @ truth) - 1.0))
         inside += list(np.abs(mu - truth) <= 2.0 * sigma)
     measured = [row.specific_force_mean for row in counted]
-    predicted = errors(measured, [row.specific_force_predicted for row in counted])
     others = [100.0 * errors(measured, other).median for other in peers(counted).values()]
     return Recorded(
         100.0 * float(np.median(sums)),
         100.0 * float(np.mean(inside)),
-        100.0 * predicted.median,
+        100.0 * errors_of(counted).median,
         tuple(others),
     )
 
@@ -160,7 +158,8 @@ def recorded_of(seed: int) -> list[Recorded]:
     """Drive one car and replay it with each logger's signals."""
     config = uncorrected()
     drive = run(new_loop(recorded_scenario(), config, seed))
-    return [_judge(drive, *_replay(drive, logger, config), config) for logger in LOGGERS.values()]
+    seen = [replayed(drive.t, logger_columns(drive, logger), config) for logger in LOGGERS.values()]
+    return [_judge(drive, *one, config) for one in seen]
 
 
 def recorded_table(cars: Iterable[list[Recorded]]) -> Table:

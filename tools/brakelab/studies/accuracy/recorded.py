@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.replay.command import Replayed, replay_into
-from brakelab.replay.summary import peers
+from brakelab.replay.summary import errors_of, judged, peers
 from brakelab.results.brakes import LEARNED, BrakeRow
 from brakelab.results.prediction import Errors, errors
 from brakelab.results.text_table import Table
@@ -42,7 +42,7 @@ class Pass(NamedTuple):
     @property
     def off(self) -> Errors:
         """Errors of the predictions."""
-        return errors(self.measured, [row.specific_force_predicted for row in self.rows])
+        return errors_of(self.rows)
 
     @property
     def measured(self) -> list[float]:
@@ -64,8 +64,7 @@ def drive_passes(log: Path, car: str, count: int) -> list[Pass]:
     with TemporaryDirectory(prefix="brake-ecu-recorded-") as folder:
         for number in range(count):
             done = _replay(log, car, car, Path(folder, f"{number}.parquet"), Path(folder, "state"))
-            rows = done.writer.brakes.rows[:: len(CORNERS)]
-            passes.append(Pass([row for row in rows if not row.left_out]))
+            passes.append(Pass(judged(done.writer.brakes.rows)))
     return passes
 
 

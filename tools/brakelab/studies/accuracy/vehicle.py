@@ -21,17 +21,14 @@ from brakelab.identify.vehicle.reader import read_drives
 from brakelab.identify.vehicle.solve import identify
 from brakelab.plant.records import GRAVITY
 from brakelab.plant.tyre import rolling_radius, stiffnesses
-from brakelab.replay.drive import replay_drive
-from brakelab.replay.quality import Findings
-from brakelab.replay.source import load_source
-from brakelab.results.brakes import BrakeBook
-from brakelab.results.prediction import errors
+from brakelab.replay.summary import errors_of, judged
 from brakelab.results.processes import run_each
 from brakelab.results.text_table import Table
 from brakelab.simulation.closed_loop import Drive, new_loop, run
 from brakelab.simulation.configured import configured, shipped, with_keys
 from brakelab.simulation.scenario import Scenario, Trace
 from brakelab.simulation.simulate import write_columns
+from brakelab.studies.accuracy.loggers import replayed
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
 from ecu.settings.config import Config, new_params
@@ -171,19 +168,9 @@ def identified_of(seed: int) -> Car:
 
 def _predicted(drive: Drive, config: Config) -> tuple[tuple[float, float], int]:
     """Return the mean error of predicted applications [%], learning and with configured friction; count."""
-    params = new_params(config)
-    book = BrakeBook(params)
-    with TemporaryDirectory(prefix="brake-ecu-identified-") as folder:
-        path = Path(folder, "drive.parquet")
-        write_columns(path, drive.t, drive.inputs, {})
-        replay_drive(
-            [Findings(path)], params, None, load_source(None), book.add, book.end_log, lambda _: None
-        )
-    rows = [row for row in book.rows[:: len(CORNERS)] if not row.left_out]
-    measured = [row.specific_force_mean for row in rows]
-    learned = errors(measured, [row.specific_force_predicted for row in rows])
-    configured = errors(measured, [row.specific_force_configured for row in rows])
-    return (100.0 * learned.mean, 100.0 * configured.mean), len(rows)
+    rows = judged(replayed(drive.t, drive.inputs, config)[1])
+    learned, unlearned = errors_of(rows), errors_of(rows, "specific_force_configured")
+    return (100.0 * learned.mean, 100.0 * unlearned.mean), len(rows)
 
 
 def _over_mass(cars: Sequence[Car], key: str) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from brakelab.logs.formats import kind_of, read_frames
 from brakelab.logs.log_quality import LogQuality
 from brakelab.replay.engine import new_ecu, run_frames
 from brakelab.replay.source import load_source
+from brakelab.replay.summary import judged
 from brakelab.results.brakes import BrakeBook, BrakeRow
 from brakelab.simulation.closed_loop import START_NS, Drive, new_loop, run
 from brakelab.simulation.configured import configured, shipped
@@ -138,7 +139,7 @@ def real_drive(car: str, log: Path) -> RealDrive:
     values = np.where(inputs["new"] == 1, inputs["value"], np.nan)
     none = np.full((len(results), 4), np.nan)
     track = Track(log.name, config, values, none, none, np.zeros(len(results), np.bool_))
-    counting = [row for row in book.rows[:: len(CORNERS)] if not row.left_out and row.t_start > 0.0]
+    counting = [row for row in judged(book.rows) if row.t_start > 0.0]
     if not counting:
         raise UserError(
             "--drive",
