@@ -203,13 +203,13 @@ def wear(
     measured: Annotated[
         str | None, option("fl=9.8,…", "Register measured linings in mm, without backplate")
     ] = None,
-) -> int:
+) -> None:
     """Show how thick the brake pads are and how far they last. Register new and measured ones."""
     from ecu import pads
     from ecu.compiling import report_compiling
 
     with report_compiling():
-        return pads.wear_command(config, state, new_pads, measured)
+        pads.wear_command(config, state, new_pads, measured)
 
 
 @app.command()

@@ -33,8 +33,8 @@ def new(
 
 
 @app.command()
-def schema() -> int:
+def schema() -> None:
     """Print the JSON schema of configurations, with units."""
     from ecu.settings import schema
 
-    return schema.schema()
+    schema.schema()

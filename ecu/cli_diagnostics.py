@@ -55,8 +55,8 @@ def diag(
 @app.command()
 def pdx(
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="File to write")],
-) -> int:
+) -> None:
     """Write the PDX file of `run --diagnostics` (ODX, ISO 22901-1)."""
     from ecu.diagnostics import pdx
 
-    return pdx.pdx(out)
+    pdx.pdx(out)

@@ -25,8 +25,8 @@ def a2l(
         Path | None,
         typer.Option("--out", "-o", metavar="FILE", help="File to write; default: standard output"),
     ] = None,
-) -> int:
+) -> None:
     """Write the A2L file of `run --xcp` (ASAM MCD-2 MC)."""
     from ecu.xcp import a2l
 
-    return a2l.a2l(config, xcp, out)
+    a2l.a2l(config, xcp, out)

@@ -195,8 +195,8 @@ def parse_measured(text: str, where: str = "--measured") -> dict[int, float]:
     return found
 
 
-def wear_command(config: Path, state: Path, new_pads: str | None, measured: str | None) -> int:
-    """Print the state of the pads, after registering new or measured ones; return 0.
+def wear_command(config: Path, state: Path, new_pads: str | None, measured: str | None) -> None:
+    """Print the state of the pads, after registering new or measured ones.
 
     Raises:
         UserError: an argument is wrong, or a daemon holds the store.
@@ -222,4 +222,3 @@ def wear_command(config: Path, state: Path, new_pads: str | None, measured: str 
     corners = appraise(params, learned, vehicle)
     print("\n".join(lines(corners)))
     give(corners=corners)
-    return 0

@@ -37,14 +37,13 @@ Field = tuple[str, str]
 """Name of a value in a message, and identifier of how it is coded."""
 
 
-def pdx(out: Path) -> int:
-    """Write the file; return 0."""
+def pdx(out: Path) -> None:
+    """Write the file."""
     document = Xml.tostring(_document(), encoding="UTF-8", xml_declaration=True)
     with ZipFile(out, "w", ZIP_DEFLATED) as file:
         file.writestr(f"{NAME}.odx-d", document)
         file.writestr("index.xml", Xml.tostring(_index(), encoding="UTF-8", xml_declaration=True))
     give(file=str(out))
-    return 0
 
 
 def _xml(tag: str, *content: Xml.Element | str, **attributes: str) -> Xml.Element:

@@ -7,12 +7,11 @@ from ecu.output import give, policy
 from ecu.settings.sections import Config
 
 
-def schema() -> int:
-    """Print the schema; return 0."""
+def schema() -> None:
+    """Print the schema."""
     give(**(found := config_schema()))
     if not policy().json:  # it is printed as it was given
         print(json.dumps(found, indent=1, ensure_ascii=False))
-    return 0
 
 
 def config_schema() -> dict[str, Any]:

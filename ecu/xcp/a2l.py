@@ -28,8 +28,8 @@ MEANINGS: Final = {
 }
 
 
-def a2l(config: Path | None, transports: Sequence[str] | None, out: Path | None) -> int:
-    """Write the file, or print it; return 0.
+def a2l(config: Path | None, transports: Sequence[str] | None, out: Path | None) -> None:
+    """Write the file, or print it.
 
     Raises:
         UserError: a wrong configuration or transport.
@@ -42,7 +42,6 @@ def a2l(config: Path | None, transports: Sequence[str] | None, out: Path | None)
     elif not policy().json:
         print(text, end="")
     give(epk=EPK, addresses={f"{record.name}.{one.name}": record.base + one.offset for record, one in _all()})
-    return 0
 
 
 def _all() -> Iterator[tuple[Record, Variable]]:

@@ -62,7 +62,7 @@ def drive_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(log: Path, observer: str, out: Path) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    assert replay([log], resource("config/suv.toml"), None, observer, None, out) == 0
+    replay([log], resource("config/suv.toml"), None, observer, None, out)
     return read_result(out).columns, read_result(out.with_suffix(".brakes.parquet")).columns
 
 

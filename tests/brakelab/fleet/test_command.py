@@ -43,7 +43,7 @@ def replayed(logs: list[Path], folder: Path) -> list[pa.Table]:
     tables = []
     for log in logs:
         out = folder / f"{log.stem}.parquet"
-        assert replay([log], SUV, None, None, folder / "state", out) == 0
+        replay([log], SUV, None, None, folder / "state", out)
         tables.append(pq.read_table(folder / f"{log.stem}.brakes.parquet").replace_schema_metadata(None))
     return tables
 

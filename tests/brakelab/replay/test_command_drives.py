@@ -19,16 +19,13 @@ pytestmark = pytest.mark.drives
 
 
 def run(log: Path, car: str, config: str, out: Path) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    assert (
-        replay(
-            [log],
-            resource(f"config/{config}.toml"),
-            resource(f"config/maps/{car}.toml"),
-            None,
-            None,
-            out,
-        )
-        == 0
+    replay(
+        [log],
+        resource(f"config/{config}.toml"),
+        resource(f"config/maps/{car}.toml"),
+        None,
+        None,
+        out,
     )
     return read_result(out).columns, read_result(out.with_suffix(".brakes.parquet")).columns
 

@@ -36,7 +36,7 @@ def signals(path: Path, change: dict[str, dict[int, float]]) -> Path:
 
 def counted(log: Path, out: Path) -> tuple[dict[str, dict], dict]:
     """Return the counts of each input by name, and the log's."""
-    assert replay([log], resource("config/suv.toml"), None, None, None, out) == 0
+    replay([log], resource("config/suv.toml"), None, None, None, out)
     (counts,) = json.loads(read_result(out).metadata["quality"])
     return {row["name"]: row for row in counts["inputs"]}, counts
 

@@ -49,24 +49,24 @@ def run(
     linings: Annotated[
         Path | None, option("LININGS", "Lining file of `identify friction`; needs --law")
     ] = None,
-) -> int:
+) -> None:
     """Run a programme on the dynamometer. Record at 200 Hz; the pad follows none of the friction laws."""
     from brakelab.identify.friction import command
     from ecu.compiling import report_compiling
 
     with report_compiling():
-        return command.run(programme, brake, seed, out, law, linings)
+        command.run(programme, brake, seed, out, law, linings)
 
 
 @app.command()
 def look(
     data: Annotated[list[Path], argument("DATA", "Recordings of one brake: .csv .parquet .mf4")],
     columns: Columns = None,
-) -> int:
+) -> None:
     """Analyse a recording. Show principal components, shares of variance, effect of the previous stop."""
     from brakelab.identify.friction import command
 
-    return command.look(data, columns)
+    command.look(data, columns)
 
 
 @app.command()
@@ -101,8 +101,8 @@ def export(
     ] = None,
     law: Annotated[str, option("LAW", "Friction law of the lining", autocompletion=laws)] = "SIM",
     axle: Annotated[str, option("AXLE", "Of a CONFIG, whose wear and dust: front or rear")] = "front",
-) -> int:
+) -> None:
     """Write an identified law as C. Friction, or wear and dust of a CONFIG; friction also as a table."""
     from brakelab.identify.export import export as write
 
-    return write(source, out, brake, law, axle)
+    write(source, out, brake, law, axle)

@@ -13,11 +13,11 @@ Fmi = Annotated[int, option("N", "Version of FMI, 3 or 2", "--fmi", min=2, max=3
 
 
 @app.command()
-def ecu(config: Config, out: Out, fmi: Fmi = 3) -> int:
+def ecu(config: Config, out: Out, fmi: Fmi = 3) -> None:
     """Write the ECU of a configuration."""
     from brakelab.fmu import command
 
-    return command.write_ecu(config, out, 2 if fmi == 2 else 3)
+    command.write_ecu(config, out, 2 if fmi == 2 else 3)
 
 
 @app.command()
@@ -29,8 +29,8 @@ def vehicle(
     plant: Plant = None,
     config: Annotated[Path | None, CONFIG_OPTION] = None,
     fmi: Fmi = 3,
-) -> int:
+) -> None:
     """Write the simulated vehicle of a scenario with its driver. CONFIG is the car of --plant as-config."""
     from brakelab.fmu import command
 
-    return command.write_vehicle(scenario, config, out, seed, draw, plant, 2 if fmi == 2 else 3)
+    command.write_vehicle(scenario, config, out, seed, draw, plant, 2 if fmi == 2 else 3)

@@ -33,13 +33,13 @@ def friction(
     discover: Annotated[
         Path | None, option("LAW.py", "Law to write of the terms found, and to identify")
     ] = None,
-) -> int:
+) -> None:
     """Identify a friction law from dynamometer recordings. Fit all laws, choose one, state its limits."""
     from brakelab.identify.friction import command
     from ecu.compiling import report_compiling
 
     with report_compiling():
-        return command.friction(data, columns, held_out, out, profile, tuple(own or ()), discover)
+        command.friction(data, columns, held_out, out, profile, tuple(own or ()), discover)
 
 
 @app.command()
@@ -54,16 +54,17 @@ def wear(
     from_logs: Annotated[
         bool, flag("--from-logs", "Write the blocks that stand for your drives, for a rig: BLOCKS.csv")
     ] = False,
-) -> int:
+) -> None:
     """Identify the wear law of brake linings from dynamometer blocks. Write a CONFIG."""
     from brakelab.identify.wear import command, from_drives
     from ecu.errors import UserError
 
     if from_logs:
-        return from_drives.blocks_from_drives(measured, config, axle, out)
-    if len(measured) > 1:
+        from_drives.blocks_from_drives(measured, config, axle, out)
+    elif len(measured) > 1:
         raise UserError(str(measured[1]), "", "one MANIFEST.csv; for blocks of drives give --from-logs")
-    return command.identify_wear(measured[0], config, axle, out, columns)
+    else:
+        command.identify_wear(measured[0], config, axle, out, columns)
 
 
 @app.command()
@@ -76,13 +77,12 @@ def dust(
     cycle: Annotated[
         bool, flag("--cycle", "Report one run of the WLTP-Brake cycle, for UN R179: RUN.md")
     ] = False,
-) -> int:
+) -> None:
     """Identify particle emission from trips with a counter. Write a CONFIG."""
     from brakelab.identify.dust import command, cycle_page
 
-    if cycle:
-        return cycle_page.report_cycle(manifest, config, axle, out, columns)
-    return command.identify_dust(manifest, config, axle, out, columns)
+    identify = cycle_page.report_cycle if cycle else command.identify_dust
+    identify(manifest, config, axle, out, columns)
 
 
 @app.command()
@@ -91,11 +91,11 @@ def thermal(
     config: Config,
     out: Annotated[Path, option("CAR.toml", "CONFIG to write, CAR.md and CAR.svg beside it")],
     map: Map = None,
-) -> int:
+) -> None:
     """Identify the disc temperature model, dry and wet. Write a CONFIG."""
     from brakelab.identify.thermal import command
 
-    return command.identify_thermal(logs, config, map, out)
+    command.identify_thermal(logs, config, map, out)
 
 
 @app.command()
@@ -107,8 +107,8 @@ def vehicle(
     closed: Annotated[
         bool, flag("--closed", "State that each drive ends at the height where it began")
     ] = False,
-) -> int:
+) -> None:
     """Identify radii, mass, drag, tyres and brakes of a car. Write a CONFIG."""
     from brakelab.identify.vehicle import command
 
-    return command.identify_vehicle(drives, config, map, closed, out)
+    command.identify_vehicle(drives, config, map, closed, out)

@@ -49,11 +49,11 @@ def scenarios_and_folders(incomplete: str) -> list[str]:
 @app.command()
 def demo(
     out: Annotated[Path, option("DIR", "Folder to write recording and report into")] = Path("out/demo"),
-) -> int:
+) -> None:
     """Brake a simulated car in real time and write a report."""
     from brakelab.rig import demo
 
-    return demo.demo(out)
+    demo.demo(out)
 
 
 @app.command()
@@ -86,7 +86,7 @@ def vehicle(
     config: Annotated[Path | None, CONFIG_OPTION] = None,
     truth: Annotated[Path | None, option("FILE.parquet", "True values of the drive, to write")] = None,
     alone: Annotated[bool, flag("--alone", "Set off at once, without waiting for an ECU")] = False,
-) -> int:
+) -> None:
     """Drive the simulated car of a scenario alone on a bus.
 
     It sets off when it hears an ECU, which you start, and leaves when that falls silent. CONFIG is the car
@@ -94,7 +94,7 @@ def vehicle(
     from brakelab.rig import vehicle_node
 
     bus = interface, channel
-    return vehicle_node.vehicle_command(scenario, bus, seed, plant, config, truth, alone)
+    vehicle_node.vehicle_command(scenario, bus, seed, plant, config, truth, alone)
 
 
 @app.command()
@@ -167,11 +167,11 @@ def replay(
     stood: Annotated[
         float | None, option("HOURS", "Time the car stood before, discs cooling", min=0.0)
     ] = None,
-) -> int:
+) -> None:
     """Replay a recorded drive through the ECU. Write results."""
     from brakelab.replay import command
 
-    return command.replay(logs, config, map, observer, state, out, cycles, force, stood)
+    command.replay(logs, config, map, observer, state, out, cycles, force, stood)
 
 
 @app.command()
@@ -198,7 +198,7 @@ def report(
     timing: Annotated[
         Path | None, option("RECORDING", "Recording of `run --record`, to show times of its loop")
     ] = None,
-) -> int:
+) -> None:
     """Write results as a page of linked figures."""
     from brakelab.report import command
     from brakelab.results.progress import progress_bar
@@ -206,7 +206,6 @@ def report(
     with progress_bar("report", None):
         command.report(result, truth, out, timing)
     wrote(out)
-    return 0
 
 
 @app.command()
@@ -284,13 +283,13 @@ def tune(
     out: Annotated[Path, option("TUNED.toml", "Tuning to write; a CONFIG can `include` it")] = Path(
         "tuned.toml"
     ),
-) -> int:
+) -> None:
     """Tune Observer 2 on simulated drives by a genetic algorithm. Ctrl-C writes the best so far."""
     from brakelab.identify.tuning import command
 
     trained = scenario or [scenario_file(name) for name in command.FIRST_SESSION]
     validated = validate or [scenario_file(name) for name in command.LATER_SESSIONS]
-    return command.tune(config, trained, validated, seeds, command.Budget(generations, population, seed), out)
+    command.tune(config, trained, validated, seeds, command.Budget(generations, population, seed), out)
 
 
 app.command(help=BENCH_HELP)(bench)

@@ -16,11 +16,11 @@ def suggest(
     ] = None,
     config: Annotated[Path | None, CONFIG_OPTION] = None,
     out: Annotated[Path | None, option("MAP.toml", "Map to write; default: print it")] = None,
-) -> int:
+) -> None:
     """Propose a map by names, units and physics, for you to edit."""
     from brakelab.mapping import command
 
-    return command.suggest(log, dbc, config, out)
+    command.suggest(log, dbc, config, out)
 
 
 @app.command()

@@ -27,15 +27,14 @@ ZIP_EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 """Earliest time of a zip file, that of every entry: the same unit gives the same bytes."""
 
 
-def write_ecu(config: Path, out: Path, version: Version = 3) -> int:
-    """Write the ECU of a configuration for a version of FMI; return 0.
+def write_ecu(config: Path, out: Path, version: Version = 3) -> None:
+    """Write the ECU of a configuration for a version of FMI.
 
     Raises:
         UserError: the configuration is wrong, the compiled library is not there, there is no C compiler, or
             `out` cannot be written.
     """
     write_fmu(ecu_unit(load_config(config)), out, version)
-    return 0
 
 
 def write_vehicle(
@@ -46,8 +45,8 @@ def write_vehicle(
     draw: str | None,
     plant: str | None,
     version: Version = 3,
-) -> int:
-    """Write the simulated vehicle of a scenario; return 0.
+) -> None:
+    """Write the simulated vehicle of a scenario.
 
     `config` is the car of the plant "as-config", and of no other.
 
@@ -60,7 +59,6 @@ def write_vehicle(
     with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder:
         driven = with_car(driven, plant, config, Path(folder))
         write_fmu(vehicle_unit(driven, seed, command_name(scenario)), out, version)
-    return 0
 
 
 def write_fmu(unit: Unit, out: Path, version: Version) -> None:

@@ -39,8 +39,8 @@ COLUMNS: Final = "disc_temperature,calliper_pressure,sliding_speed,mu_b_first,mu
 UNITS: Final = "degC,bar,m/s,-,-"
 
 
-def export(source: Path, out: Path, brake: str | None, law: str, axle: str) -> int:
-    """Write a law of a lining file, or what CONFIG knows of an axle's brakes; return 0.
+def export(source: Path, out: Path, brake: str | None, law: str, axle: str) -> None:
+    """Write a law of a lining file, or what CONFIG knows of an axle's brakes.
 
     Raises:
         UserError: `source` is neither, has no such brake or law, or `out` ends in something else.
@@ -67,7 +67,6 @@ def export(source: Path, out: Path, brake: str | None, law: str, axle: str) -> i
     say(f"{out}: {'C99, needs -lm' if out.suffix == '.c' else 'no memory: first contact, and held for 1 s'}")
     give(lines=text.count("\n"))
     wrote(out)
-    return 0
 
 
 def _chosen(path: Path, brake: str | None, law: str) -> tuple[Law, RigBrake]:

@@ -46,8 +46,8 @@ PERIODS: Final = 3.0  # likewise, of a sender that is slow
 STEP: Final = 0.05  # s, time-outs are rounded up to it
 
 
-def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) -> int:
-    """Print a proposal with its evidence; write it to `out`, or print it where there is none. Returns 0.
+def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) -> None:
+    """Print a proposal with its evidence; write it to `out`, or print it where there is none.
 
     `config` is of the car: where it sends a brake torque in place of pressures, its brakes turn one into the
     others.
@@ -62,7 +62,8 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
     params = new_params(load_config(config))[0] if config else None
     car = ANY_CAR if params is None else car_of(params)
     if kind_of(log) == "signals":
-        return _suggest_columns(log, out, car)
+        _suggest_columns(log, out, car)
+        return
     if dbc is None:
         raise UserError("--dbc", "", f"missing; {log} holds frames: give the database of this car")
     database, overlapping = _load(dbc)
@@ -94,13 +95,10 @@ def suggest(log: Path, dbc: Path | None, config: Path | None, out: Path | None) 
     others = other_sources(found, here, motion, car)
     comments = [*hints, *map(str, others)]
     text = map_text(found, here, (out or Path("map.toml")), dbc, strict, interfaces, bus, comments, car)
-    _show(found, motion.drives, others)
-    for line in hints + _warnings(found):
-        say(line)
-    if written := _written(text, out):
-        load_signal_map(written)
-        _say_next(log, written)
-    return 0
+    _show(found, motion.drives, others, hints)
+    _give(log, text, out)
+    if out is not None:
+        load_signal_map(out)
 
 
 def _warnings(found: list[Found]) -> list[str]:
@@ -113,7 +111,7 @@ def _warnings(found: list[Found]) -> list[str]:
     return [f"{name}: {warning}" for (_, warning), name in names.items() if warning]
 
 
-def _suggest_columns(log: Path, out: Path | None, car: Car) -> int:
+def _suggest_columns(log: Path, out: Path | None, car: Car) -> None:
     """Propose a map of the columns of a signal file, as `suggest` does of frames."""
     quality = SignalQuality()
     columns, series = read_column_series(log, quality)
@@ -124,15 +122,12 @@ def _suggest_columns(log: Path, out: Path | None, car: Car) -> int:
     wheel = found[0].series
     _refuse_unitless(log, wheel, f'write it behind the names: "{wheel.signal} [km/h]"', car)
     others = other_sources(found, series, motion, car)
-    _show(found, motion.drives, others)
-    for line in _warnings(found):
-        say(line)
+    _show(found, motion.drives, others, [])
     after = {one.target: timeout(one) for one in found}
     text = column_map_text(log, columns, found, after, car) + "".join(f"# {one}\n" for one in others)
-    if written := _written(text, out):
-        read_column_map(written)
-        _say_next(log, written)
-    return 0
+    _give(log, text, out)
+    if out is not None:
+        read_column_map(out)
 
 
 def _refuse_unitless(where: Path, wheel: Series, remedy: str, car: Car) -> None:
@@ -146,22 +141,17 @@ def _refuse_unitless(where: Path, wheel: Series, remedy: str, car: Car) -> None:
     raise UserError(str(where), wheel.signal, f"no unit is stated for this wheel speed; {remedy} ({known})")
 
 
-def _say_next(log: Path, out: Path) -> None:
-    following = f"brake-ecu map check {log} --map {out}"
-    give(next=following)
-    say(f"next: {following}")
-
-
-def _written(text: str, out: Path | None) -> Path | None:
-    """Print a map, or write it and return where."""
+def _give(log: Path, text: str, out: Path | None) -> None:
+    """Print a map, or write it."""
     give(map=text)
     if out is None:
         print(text)
-        return None
+        return
     write_text(out, text)
-    say(f"written: {out}; check and edit it")
-    give(written=[out])
-    return out
+    following = f"brake-ecu map check {log} --map {out}"
+    give(written=[out], next=following)
+    for line in (f"written: {out}; check and edit it", f"next: {following}"):
+        say(line)
 
 
 def _load(dbc: Path) -> tuple[Database, list[str]]:
@@ -178,7 +168,7 @@ def _load(dbc: Path) -> tuple[Database, list[str]]:
     return Database(usable, strict=False), overlapping
 
 
-def _show(found: list[Found], drives: bool, others: list[Source]) -> None:
+def _show(found: list[Found], drives: bool, others: list[Source], hints: list[str]) -> None:
     console = Console(stderr=True)
     if not console.is_terminal:
         console = Console(stderr=True, width=WIDTH)
@@ -210,6 +200,8 @@ def _show(found: list[Found], drives: bool, others: list[Source]) -> None:
         console.print(f"nothing found for {', '.join(missing)}", highlight=False)
     if not drives:
         console.print("the car stands in this log: signs and scales could not be checked", highlight=False)
+    for line in hints + _warnings(found):
+        say(line)
 
 
 def _source(found: Found | Source) -> dict[str, str]:

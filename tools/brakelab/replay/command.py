@@ -60,8 +60,8 @@ def replay(
     cycles: Path | None = None,
     force: bool = False,
     stood: float | None = None,
-) -> int:
-    """Replay `logs` as one drive into `out`, print the findings and return 0; arguments as `replay_into`.
+) -> None:
+    """Replay `logs` as one drive into `out`, print the findings; arguments as `replay_into`.
 
     Raises:
         UserError: an argument, the configuration, the map or a log is not right.
@@ -79,7 +79,6 @@ def replay(
     if nothing_usable(done.findings):
         names = ", ".join(group.name for group in NEEDED)
         raise RunFault(f"{out}: not one sample of the needed inputs was usable ({names})")
-    return 0
 
 
 class Replayed(NamedTuple):

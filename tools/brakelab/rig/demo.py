@@ -89,8 +89,8 @@ def _say_progress(line: str) -> None:
         say(line)
 
 
-def demo(out: Path) -> int:
-    """Run the demonstration; leave report, recording, truth and results in `out`; return the exit code 0.
+def demo(out: Path) -> None:
+    """Run the demonstration; leave report, recording, truth and results in `out`.
 
     Raises:
         UserError: `out` cannot be written.
@@ -114,7 +114,6 @@ def demo(out: Path) -> int:
     report(written.result, out / "truth.parquet", page, recordings[0])
     say(f"report: {page.resolve()}")
     give(written=[page, written.result, out / "truth.parquet"])
-    return 0
 
 
 def _in_one_process(bus: Bus, config: Path, out: Path) -> list[Path]:

@@ -285,8 +285,8 @@ def vehicle_command(
     config: Path | None,
     truth: Path | None,
     alone: bool,
-) -> int:
-    """Drive the simulated car of a scenario on a bus; return 0. `alone`: without waiting for an ECU.
+) -> None:
+    """Drive the simulated car of a scenario on a bus. `alone`: without waiting for an ECU.
 
     Raises:
         UserError: a file is wrong or missing, the bus cannot be opened.
@@ -300,7 +300,6 @@ def vehicle_command(
             truth_file=truth,
             with_ecu=not alone,
         )
-    return 0
 
 
 def drive_on_bus(

@@ -46,8 +46,8 @@ def _per_megajoule(trips: list[Applications]) -> str:
     return ", ".join(f"{trip} {rate:.1e} 1/MJ" for trip, rate in rates.items())
 
 
-def identify_dust(manifest: Path, config: Path, axle: str, out: Path, columns: Path | None = None) -> int:
-    """Identify the emission of an axle's brakes; write `out` and `out`.md, return 0.
+def identify_dust(manifest: Path, config: Path, axle: str, out: Path, columns: Path | None = None) -> None:
+    """Identify the emission of an axle's brakes; write `out` and `out`.md.
 
     `columns`: file of columns of the trips.
 
@@ -78,4 +78,3 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path, columns: P
     print(f"{page}: models beside each other, background, correlations")
     give(model=chosen.name, left_out=chosen.left_out_sum, trips=len(trained))
     wrote(*written, next=f"brake-ecu replay LOG --config {out} --out drive.parquet")
-    return 0

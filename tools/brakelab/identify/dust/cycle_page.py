@@ -114,8 +114,8 @@ def findings(run: Run) -> list[str]:
     return found
 
 
-def report_cycle(manifest: Path, config: Path, axle: str, out: Path, columns: Path | None = None) -> int:
-    """Write the report of a run of the WLTP-Brake cycle; return 0. `columns`: file of columns of the trips.
+def report_cycle(manifest: Path, config: Path, axle: str, out: Path, columns: Path | None = None) -> None:
+    """Write the report of a run of the WLTP-Brake cycle. `columns`: file of columns of the trips.
 
     Raises:
         UserError: an argument or a file is invalid.
@@ -145,4 +145,3 @@ def report_cycle(manifest: Path, config: Path, axle: str, out: Path, columns: Pa
         km=run.sum_of("km"), friction_share=run.share, findings=found,
     )  # fmt: skip
     wrote(out)
-    return 0

@@ -49,8 +49,8 @@ BETWEEN: Final = 600.0
 
 def run(
     programme: str, brake: str, seed: int, out: Path, law: str | None = None, linings: Path | None = None
-) -> int:
-    """Run a programme on the simulated dynamometer and write its recording. Returns 0.
+) -> None:
+    """Run a programme on the simulated dynamometer and write its recording.
 
     `programme`: a file, or a name of config/rig; `brake`: A, B or C, of which
     `seed` draws a pad and the sensors, or a lining of the file `linings`; `law`: of the lining, not a pad.
@@ -85,11 +85,10 @@ def run(
         beside,
         next=f"brake-ecu lab report {out}; brake-ecu identify friction {out} --out {lining_file}",
     )
-    return 0
 
 
-def look(data: list[Path], columns: Path | None) -> int:
-    """Print principal components, the effect of the previous stop and the disc's heat. Returns 0."""
+def look(data: list[Path], columns: Path | None) -> None:
+    """Print principal components, the effect of the previous stop and the disc's heat."""
     measured = _read(data, columns)
     stops = measured.stops
     _need(stops, data[0])
@@ -98,7 +97,6 @@ def look(data: list[Path], columns: Path | None) -> int:
     give(stops=len(stops))
     console.print(history_line(history_effect(stops)), highlight=False)
     console.print(heat_line(heat_capacity(stops, measured.columns)), highlight=False)
-    return 0
 
 
 def friction(
@@ -109,8 +107,8 @@ def friction(
     profile: str | None = None,
     own: tuple[str, ...] = (),
     discover: Path | None = None,
-) -> int:
-    """Identify all laws, print them, and write them with the chosen one as a lining file. Returns 0.
+) -> None:
+    """Identify all laws, print them, and write them with the chosen one as a lining file.
 
     A page with the law's fit is written beside it, with the ending .html.
 
@@ -170,7 +168,6 @@ def friction(
     give(chosen=identified.chosen.name, stops=identified.stops)
     wrote(out, page)
     say(f"{out}: the law chosen under the name SIM; {page}: how well and how far it holds")
-    return 0
 
 
 def _linings(path: Path | None) -> dict[str, Lining]:

@@ -56,8 +56,8 @@ def with_fits(config: Config, fits: dict[str, Fit]) -> Config:
     return with_keys(config, keys)
 
 
-def identify_thermal(logs: Sequence[Path], config: Path, map: Path | None, out: Path) -> int:
-    """Identify the disc temperature model of a car; write `out`, `out`.md and `out`.svg, return 0.
+def identify_thermal(logs: Sequence[Path], config: Path, map: Path | None, out: Path) -> None:
+    """Identify the disc temperature model of a car; write `out`, `out`.md and `out`.svg.
 
     Raises:
         UserError: an argument or a log is invalid, or the logs identify nothing.
@@ -104,4 +104,3 @@ def identify_thermal(logs: Sequence[Path], config: Path, map: Path | None, out: 
             f"1/s; {_about(axle)}, inside 2σ {inside:.0f} %"
         )
     wrote(*written, next=f"brake-ecu replay LOG --config {out} --out drive.parquet")
-    return 0

@@ -51,11 +51,11 @@ class Row(NamedTuple):
 
 def tune(
     config: Path, trained: Sequence[Path], validated: Sequence[Path], seeds: int, budget: Budget, out: Path
-) -> int:
+) -> None:
     """Tune Observer 2 on `trained` with cars 0 to `seeds` - 1, validate it with as many others, write `out`.
 
     Validation is in closed loop, over `trained` and `validated`. After Ctrl-C the best tuning so far is
-    written. Returns 0.
+    written.
 
     Raises:
         UserError: a file cannot be read, is wrong, or cannot be written; a scenario never brakes.
@@ -75,7 +75,6 @@ def tune(
     )
     _write(out, of, rows, best.config)
     _tell(out, of, rows, seeds)
-    return 0
 
 
 def record_drives(config: Config, scenarios: Mapping[Path, Scenario], cars: range) -> list[Recording]:

@@ -15,8 +15,8 @@ from ecu.output import give, say, wrote
 from ecu.settings.config import load_config, new_params
 
 
-def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, closed: bool, out: Path) -> int:
-    """Identify the car of `drives`; write `out`, a page and, with a `map`, that without zeros. Return 0.
+def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, closed: bool, out: Path) -> None:
+    """Identify the car of `drives`; write `out`, a page and, with a `map`, that without zeros.
 
     Raises:
         UserError: an argument or a file is not right, or the drives identify nothing.
@@ -59,4 +59,3 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
     with_map = f" --map {own_map if zeros else map}" if map else ""
     replay = f"brake-ecu replay {drives[0]} --config {out}{with_map} --out drive.parquet"
     wrote(*(written if map and zeros else written[:3]), next=replay)
-    return 0

@@ -120,8 +120,8 @@ def _refuse_disagreeing(blocks: list[Block], what: str, wear: Array, mass: Array
         raise UserError(f"block {blocks[place].name}", "", remedy)
 
 
-def identify_wear(manifest: Path, config: Path, axle: str, out: Path, columns: Path | None = None) -> int:
-    """Identify the wear law of an axle's linings; write `out` and `out`.md, return 0.
+def identify_wear(manifest: Path, config: Path, axle: str, out: Path, columns: Path | None = None) -> None:
+    """Identify the wear law of an axle's linings; write `out` and `out`.md.
 
     `columns`: file of columns of the blocks.
 
@@ -170,4 +170,3 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path, columns: P
         f"{100 * leave_one_out(fit, fused.mass):.1f} % RMS, rank {fit.rank} of 7"
     )
     wrote(*written, next=f"brake-ecu replay LOG --config {out} --out drive.parquet")
-    return 0

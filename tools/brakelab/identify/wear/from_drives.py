@@ -28,10 +28,8 @@ COUNT: Final = 300
 """Applications of a block; the thesis has 250 and more."""
 
 
-def blocks_from_drives(drives: list[Path], config: Path, axle: str, out: Path) -> int:
+def blocks_from_drives(drives: list[Path], config: Path, axle: str, out: Path) -> None:
     """Write blocks that stand for drives: `out`, the manifest, and beside it programmes, tables and a page.
-
-    Returns 0.
 
     Raises:
         UserError: an argument or a drive is invalid.
@@ -75,4 +73,3 @@ def blocks_from_drives(drives: list[Path], config: Path, axle: str, out: Path) -
     give(blocks=[block.name for block in blocks], mass=mass, applications=len(road.energy), left_out=left_out)
     first = programmes[0]
     wrote(*written, next=f"brake-ecu lab run {first} --out {first.with_name(f'{first.stem}-run.csv')}")
-    return 0

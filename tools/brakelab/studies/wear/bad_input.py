@@ -99,7 +99,7 @@ TRIPS: Final[dict[str, Spoil]] = {
 
 
 def _answers(
-    source: Path, cases: dict[str, Spoil], identify: Callable[[Path, Path], int]
+    source: Path, cases: dict[str, Spoil], identify: Callable[[Path, Path], None]
 ) -> Iterator[Answer]:
     for what, spoil in cases.items():
         with TemporaryDirectory() as name:
