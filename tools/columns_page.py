@@ -8,6 +8,7 @@ from brakelab.results.brakes import BRAKE_UNITS, BrakeRow
 from brakelab.results.files import MEASURED
 from ecu.contract.signals import CORNERS, OUTPUT_SIGNALS, column_names, topic_of, without_corner
 from ecu.settings.described import texts_below_keys
+from page_tables import table
 
 PAGE: Final = Path(__file__).parent.parent / "docs" / "reference-columns.md"
 HEAD: Final = """# Columns of results
@@ -19,12 +20,6 @@ Names and units are the same in Parquet, MDF4, MCAP and [Python](python.md); wha
 car's. What is not available is null. Topics are those of MCAP and of [live Foxglove](watch.md#in-foxglove),
 where a wheel's names have no ending.
 """
-
-
-def _table(head: str, rows: Iterable[tuple[str, ...]]) -> str:
-    count = head.count("|") + 1
-    lines = [f"| {head} |", f"|{' --- |' * count}", *(f"| {' | '.join(row)} |" for row in rows)]
-    return "\n".join(lines) + "\n"
 
 
 def _rows() -> Iterable[tuple[str, ...]]:
@@ -51,8 +46,10 @@ def columns_text() -> str:
         [
             HEAD,
             "## Rows\n\n`RESULT.parquet`, one every 10 ms.\n",
-            _table("column | unit | meaning | topic", _rows()),
+            *table("| column | unit | meaning | topic |", _rows()),
+            "",
             "## Brake applications\n\n`RESULT.brakes.parquet`, topic `/brakes`; one for each and wheel.\n",
-            _table("column | unit | meaning", brakes),
+            *table("| column | unit | meaning |", brakes),
+            "",
         ]
     )

@@ -26,6 +26,7 @@ from ecu.runtime.loop import GIVEN_UP_NS
 from ecu.runtime.prepare import LISTEN_S
 from ecu.runtime.standby import SILENCE_NS
 from ecu.settings.hydraulics import BUILD_UP, RELEASE
+from page_tables import table
 
 ROOT: Final = Path(__file__).parent.parent
 DBC: Final = ROOT / "dbc" / "brake_ecu.dbc"
@@ -69,26 +70,21 @@ the bus; `brake-ecu doctor` reckons it for a map and the bit rate of the interfa
 
 
 def _frames(messages: list[Message]) -> str:
-    lines = [
-        "## Frames",
-        "",
-        "| id | message | sender | cycle | Data ID | without it |",
-        "| --- | --- | --- | --- | --- | --- |",
-    ]
+    rows = []
     for message in messages:
         cycle, slowest = attribute(message, "GenMsgCycleTime"), attribute(message, "CycleTimeSlowest")
         data_id = attribute(message, "E2EDataId")
         ours = "BrakeEcu" in message.senders
-        cells = (
+        rows.append((
             f"0x{message.frame_id:03X}",
             message.name,
             "ECU" if ours else "car",
             f"{cycle} to {slowest} ms" if slowest else f"{cycle} ms",
             f"0x{data_id:04X}" if data_id else "not protected",
             _without(message.name),
-        )
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+        ))  # fmt: skip
+    found = table("| id | message | sender | cycle | Data ID | without it |", rows)
+    return "\n".join(["## Frames", "", *found])
 
 
 def _without(name: str) -> str:
@@ -106,22 +102,14 @@ def _without(name: str) -> str:
 
 
 def _signals(messages: list[Message]) -> str:
-    lines = [
-        "## Signals",
-        "",
-        "Value = raw · scale + offset. A sender that has no value sends the code of the last column. An input is",
-        "lost at the age of its time-out.",
-        "",
-        "| message | signal | start, bits | scale, offset | range | unit | time-out | not available |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
-    ]
+    rows = []
     for message in messages:
         for signal in message.signals:
             if signal.name in ("crc", "alive_counter"):
                 continue
             place, code = INPUT.get(signal.name), not_available_code(signal)
             kind = "float" if signal.is_float else "signed" if signal.is_signed else "unsigned"
-            cells = (
+            rows.append((
                 message.name,
                 f"`{signal.name}`",
                 f"{signal.start}, {signal.length} {kind}",
@@ -130,9 +118,18 @@ def _signals(messages: list[Message]) -> str:
                 signal.unit or "",
                 "" if place is None else f"{INPUT_SIGNALS[place].timeout_s:g} s",
                 "NaN" if code is None else str(code),
-            )
-            lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+            ))  # fmt: skip
+    head = "| message | signal | start, bits | scale, offset | range | unit | time-out | not available |"
+    return "\n".join(
+        [
+            "## Signals",
+            "",
+            "Value = raw · scale + offset. A sender that has no value sends the code of the last column. An "
+            "input is\nlost at the age of its time-out.",
+            "",
+            *table(head, rows),
+        ]
+    )
 
 
 def _protection() -> str:

@@ -8,7 +8,7 @@ from ecu.diagnostics import read_faults, services, session
 from ecu.diagnostics.identifiers import MEASURED, SESSION, TEXTS, UNITS, has_corners, scaling_of
 from ecu.diagnostics.server import SELF_TESTS
 from ecu.diagnostics.trouble_codes import FAILURE_TYPES, TROUBLE_CODES
-from page_tables import filled
+from page_tables import filled, table
 
 PAGE: Final = Path(__file__).parent.parent / "docs/diagnostics.md"
 
@@ -40,16 +40,16 @@ def _services() -> list[str]:
         " A positive response is left out where the sub-function says so",
         "(suppressPosRspMsgIndicationBit), refusals 11, 12, 31, 7E and 7F where the request was to all ECUs.",
         "",
-        "| | service | session | |",
-        "| --- | --- | --- | --- |",
     ]
+    rows = []
     for number, service in services.SERVICES.items():
         name, what = _SERVICES[number]
-        lines.append(f"| {number:02X} | {name} | {'any' if service.in_default else 'extended'} | {what} |")
+        rows.append((f"{number:02X}", name, "any" if service.in_default else "extended", what))
     routines = ", ".join(f"{number:04X} {name}" for number, name in services.ROUTINES.items())
     results = "; ".join(SELF_TESTS)
     return [
         *lines,
+        *table("| | service | session | |", rows),
         "",
         f"Routines: {routines}.",
         "New pads have a byte with a bit of each corner, 01 fl, 02 fr, 04 rl, 08 rr. Both ask for access.",
@@ -93,13 +93,10 @@ def _codes() -> list[str]:
         " (from 32 on: `active_faults_2`),",
         "with the failure type of SAE J2012-DA that fits. Meaning and remedy: [faults.md](faults.md).",
         "",
-        "| code | bytes | bit | fault | failure type |",
-        "| --- | --- | --- | --- | --- |",
     ]
+    rows = []
     for code in TROUBLE_CODES:
         word, bit = divmod(code.fault.bit.bit_length() - 1, WORD)
-        lines.append(
-            f"| {code.text} | {code.number:06X} | {bit if word == 0 else f'2: {bit}'} | {code.fault.name}"
-            f" | {FAILURE_TYPES[code.number & 0xFF]} |"
-        )
-    return lines
+        place, kind = f"{bit}" if word == 0 else f"2: {bit}", FAILURE_TYPES[code.number & 0xFF]
+        rows.append((code.text, f"{code.number:06X}", place, code.fault.name, kind))
+    return [*lines, *table("| code | bytes | bit | fault | failure type |", rows)]

@@ -12,3 +12,8 @@ def filled(page: str, parts: Iterable[Iterable[str]]) -> str:
     before, _, rest = page.partition(BEGIN)
     text = "\n\n".join("\n".join(part) for part in parts)
     return before + BEGIN + text + "\n" + END + rest.partition(END)[2]
+
+
+def table(head: str, rows: Iterable[Iterable[str]]) -> list[str]:
+    """Return the lines of a table below the line `head`."""
+    return [head, f"|{' --- |' * (head.count('|') - 1)}", *(f"| {' | '.join(row)} |" for row in rows)]

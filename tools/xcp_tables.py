@@ -7,7 +7,7 @@ from ecu.xcp.a2l import MEANINGS
 from ecu.xcp.protocol import Command
 from ecu.xcp.transport import CAN, ETHERNET
 from ecu.xcp.variables import RECORDS
-from page_tables import filled
+from page_tables import filled, table
 
 PAGE: Final = Path(__file__).parent.parent / "docs/xcp.md"
 
@@ -56,18 +56,11 @@ def with_xcp_tables(page: str) -> str:
 
 
 def _records() -> list[str]:
-    lines = [
-        "## Addresses",
-        "",
-        "| group | addresses | variables | |",
-        "| --- | --- | --- | --- |",
-    ]
+    rows = []
     for record in RECORDS:
         last, count = record.base + record.dtype.itemsize - 1, len(record.variables)
-        lines.append(
-            f"| `{record.name}` | {record.base:05X}–{last:05X} | {count} | {MEANINGS[record.name]} |"
-        )
-    return lines
+        rows.append((f"`{record.name}`", f"{record.base:05X}–{last:05X}", str(count), MEANINGS[record.name]))
+    return ["## Addresses", "", *table("| group | addresses | variables | |", rows)]
 
 
 def _commands() -> list[str]:
@@ -77,7 +70,6 @@ def _commands() -> list[str]:
         f"MAX_CTO and MAX_DTO: {ETHERNET.command} and {ETHERNET.data} on UDP and TCP,"
         f" {CAN.command} and {CAN.data} on CAN.",
         "",
-        "| | command | |",
-        "| --- | --- | --- |",
     ]
-    return [*lines, *(f"| {one:02X} | {one.name} | {_WHAT[one]} |" for one in Command)]
+    rows = [(f"{one:02X}", one.name, _WHAT[one]) for one in Command]
+    return [*lines, *table("| | command | |", rows)]
