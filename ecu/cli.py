@@ -259,11 +259,11 @@ def _describe(error: Exception) -> tuple[str, int]:
 
 
 @cache
-def _add_commands(to: typer.Typer = app) -> int:
+def _add_commands() -> int:
     """Add the commands of other distributions, once; return the number of these distributions."""
     others = entry_points(group="brake_ecu.commands")
     for point in others:
-        to.add_typer(point.load())
+        app.add_typer(point.load())
     return len(others)
 
 

@@ -154,7 +154,7 @@ def _one(task: tuple[str, str, str, int]) -> list[Cell]:
     return cells(*task)
 
 
-def all_cells(seed: int = 1) -> list[Cell]:
+def all_cells() -> list[Cell]:
     """Drive every input by every car on every road, on all cores."""
-    tasks = [(*cell, seed) for cell in product(CARS, ROADS, INPUTS)]
+    tasks = [(*cell, 1) for cell in product(CARS, ROADS, INPUTS)]
     return [cell for found in run_each("lies", _one, tasks) for cell in found]

@@ -12,6 +12,7 @@ import numpy as np
 from brakelab.arrays import Array
 from brakelab.plant.disc import cooling_rate, disc_step
 from brakelab.plant.driver import LIFT_OFF_DECEL
+from brakelab.plant.dynamometer import AMBIENT
 from brakelab.plant.emission import conditioning, emission_rate, treat
 from brakelab.plant.jit import Record, kernel
 from brakelab.plant.records import GRAVITY, RecordArray
@@ -101,12 +102,10 @@ def _brake(
             sums[3, i] = max(sums[3, i], heat[i])
 
 
-def drive_open(
-    car: RecordArray, params: Params, trips: list[tuple[float, Array]], ambient: float = 20.0
-) -> OpenDrive:
+def drive_open(car: RecordArray, params: Params, trips: list[tuple[float, Array]]) -> OpenDrive:
     """Return the sums of a drawn car's brakes on `trips`; `params` of its ECU, shape (1,)."""
     sums, treatment = np.zeros((4, 4)), np.zeros(4)
     for begins, drive in trips:
         cleaner = np.zeros(1, CLEANER_STATE)
-        _brake(car[0], params[0], cleaner[0], drive, ambient, np.full(4, begins), sums, treatment)
+        _brake(car[0], params[0], cleaner[0], drive, AMBIENT, np.full(4, begins), sums, treatment)
     return OpenDrive(*sums)

@@ -27,12 +27,12 @@ def _span(values: list[float]) -> str:
     return f"{min(values):.0f} to {max(values):.0f}"
 
 
-def heat_panels(linings: Linings, brake: str = "A") -> list[Panel]:
+def heat_panels(linings: Linings) -> list[Panel]:
     """Return Figures 3.6b, 3.7 and 3.8: cooling over speed, a disc that cools, and one that a stop heats.
 
     Grey: the conventional model (delta_1 = 0); blue: delta_1 as in the lining file; orange: as printed.
     """
-    disc = linings.lining[brake].disc
+    disc = linings.lining["A"].disc
     kinds = ((0.0, GREY), (1.0, BLUE), (PRINTED, ORANGE))
     speed, t = np.linspace(0.0, 40.0, 2), np.linspace(0.0, 900.0, 100)
 
@@ -41,26 +41,22 @@ def heat_panels(linings: Linings, brake: str = "A") -> list[Panel]:
 
     lines = [Line(speed, 1e3 * np.array([rate(factor, v) for v in speed]), c) for factor, c in kinds]
     top = 1.05 * float(lines[-1].y.max())
-    found = [Panel(f"3.6b {brake}: cooling [10⁻³/s]", "speed [m/s]", (0.0, 40.0), (0.0, top), lines)]
+    found = [Panel("3.6b A: cooling [10⁻³/s]", "speed [m/s]", (0.0, 40.0), (0.0, top), lines)]
     for kmh in (30.0, 130.0):
         lines = [
             Line(t, AMBIENT + (400.0 - AMBIENT) * np.exp(-rate(factor, kmh * KMH) * t), c)
             for factor, c in kinds
         ]
-        found.append(
-            Panel(f"3.7 {brake}: disc [°C], {kmh:.0f} km/h", "t [s]", (0.0, 900.0), (0.0, 400.0), lines)
-        )
+        found.append(Panel(f"3.7 A: disc [°C], {kmh:.0f} km/h", "t [s]", (0.0, 900.0), (0.0, 400.0), lines))
     for kmh in (50.0, 130.0):
         lines = []
         for factor, c in kinds:
             stop = new_stop(PRESSURE, kmh * KMH, 5.0 * KMH, 220.0, pressure=30e5)
-            trace = run_stop(rig_of(linings, brake, "SIM", factor), stop)
+            trace = run_stop(rig_of(linings, "A", "SIM", factor), stop)
             lines.append(Line(np.array(trace["t"]), np.array(trace["temperature"]), c))
         ends = (0.0, float(lines[0].x[-1]))
         high = 1.02 * max(float(line.y.max()) for line in lines)
-        found.append(
-            Panel(f"3.8 {brake}: disc [°C], from {kmh:.0f} km/h", "t [s]", ends, (215.0, high), lines)
-        )
+        found.append(Panel(f"3.8 A: disc [°C], from {kmh:.0f} km/h", "t [s]", ends, (215.0, high), lines))
     return found
 
 
