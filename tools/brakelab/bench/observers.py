@@ -3,16 +3,47 @@
 from collections.abc import Callable, Iterable
 from typing import Final
 
-from brakelab.bench.observer_times import step_times
+from brakelab.bench.braking import simulated_stop
+from brakelab.bench.step import CYCLES, ROUNDS, run_steps
 from brakelab.results.processes import new_pool
 from brakelab.results.progress import tracked
-from brakelab.simulation.configured import configured
+from brakelab.simulation.configured import configured, with_observer
 from brakelab.studies.accuracy.observers import Sample, Task, observer_rows, tasks
 from brakelab.studies.accuracy.observers_picture import PICTURED, consistency_of, write_picture
 from brakelab.studies.accuracy.observers_table import finite, observer_tables
 from brakelab.studies.accuracy.stops import drawn_of
-from brakelab.studies.measure import machine, plain_row
+from brakelab.studies.measure import Figure, alternate, machine, plain_row, timed
 from brakelab.studies.study import Asked, Measured, Study
+from ecu.algorithm.step import new_state
+from ecu.contract.params import OBSERVERS
+from ecu.contract.records import OUTPUTS, RecordArray, new_record
+from ecu.settings.config import new_params
+
+
+def step_times() -> dict[str, Figure]:
+    """Return the processor time of a whole cycle with each observer [µs]."""
+    stop = simulated_stop()
+    inputs = stop.inputs[: stop.braking + CYCLES]
+    measured = []
+    for observer in OBSERVERS:
+        params = new_params(with_observer(configured(), observer))
+        params["mapped"] = stop.params["mapped"]
+        state, outputs = new_state(params), new_record(OUTPUTS)
+        run_steps(params, state, inputs[: stop.braking], outputs)
+        measured.append(_timed(params, state, inputs[stop.braking :], outputs))
+    return dict(zip(OBSERVERS, alternate(ROUNDS, measured), strict=True))
+
+
+def _timed(
+    params: RecordArray, start: RecordArray, inputs: RecordArray, outputs: RecordArray
+) -> Callable[[], float]:
+    state = start.copy()
+
+    def reset() -> None:
+        state[:] = start
+
+    return timed(lambda: run_steps(params, state, inputs, outputs), len(inputs), reset)
+
 
 TEXT: Final = (
     "Cars and their sensors are drawn per seed about config/plant/suv.toml and Table 4.1. Cold: the "

@@ -24,7 +24,7 @@ STUDIES: Final = {
         "margins": "studies.control.margins",
         "blending": "studies.control.blending",
         "failures": "studies.control.failures",
-        "lies": "bench.lies",
+        "lies": "studies.lies_table",
     },
     "physics": {
         "friction": "studies.physics.friction",
