@@ -59,7 +59,7 @@ def members(demo):
     """Return the process ids of a demo by name."""
     vehicle, loop = (
         next(pid for pid in children(demo.pid) if name in Path(f"/proc/{pid}/cmdline").read_bytes())
-        for name in (b"brakelab.rig.vehicle_node", b"ecu.cli")
+        for name in (b"\0vehicle\0", b"\0run\0")
     )
     (supervisor,) = children(loop)
     (recorder,) = children(supervisor)

@@ -50,7 +50,18 @@ def test_an_independent_log_gives_the_same_bits(daemon, witness, tmp_path, lost_
     unit = daemon("--config", CONFIG, "-i", "socketcan", "-c", "vcan0", "--record", tmp_path / "record")
     unit.wait_for("ready")
     independent = witness()
-    command = [sys.executable, "-m", "brakelab.rig.vehicle_node", scenario, "-i", "socketcan", "-c", "vcan0"]
+    command = [
+        sys.executable,
+        "-m",
+        "ecu.cli",
+        "vehicle",
+        scenario,
+        "--alone",
+        "-i",
+        "socketcan",
+        "-c",
+        "vcan0",
+    ]
     with subprocess.Popen(command, env=ENVIRONMENT, stdout=-1) as vehicle:
         assert vehicle.stdout is not None
         vehicle.stdout.readline()

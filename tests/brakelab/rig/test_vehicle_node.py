@@ -9,7 +9,7 @@ import pytest
 
 from brakelab.plant.description import load_plant
 from brakelab.rig import vehicle_node
-from brakelab.rig.vehicle_node import drive_in_real_time, main, new_node, stay_with_ecu, write_truth_file
+from brakelab.rig.vehicle_node import drive_in_real_time, new_node, stay_with_ecu, write_truth_file
 from brakelab.simulation.closed_loop import plans
 from brakelab.simulation.faults import Fault
 from brakelab.simulation.scenario import Scenario, load_scenario
@@ -20,6 +20,7 @@ from ecu.bus.protocol import BusStatus
 from ecu.bus.transmit import frame_buffer, new_transmission, transmit
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import N_OUTPUTS, OUTPUT
+from ecu.errors import UserError
 from ecu.runtime.clock import TimeSource
 from ecu.settings.config import load_config
 
@@ -180,7 +181,7 @@ def test_truth_file_knows_when_it_started(tmp_path: Path) -> None:
 def test_a_mistake_is_one_line_and_exit_code_2(
     arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(arguments) == 2
+    assert cli.main(["vehicle", *arguments]) == 2
     line = capsys.readouterr().err.strip().splitlines()
     assert len(line) == 1
     assert said in line[0]
@@ -229,3 +230,18 @@ def test_the_command_names_a_car_that_is_none(
     line = capsys.readouterr().err
     assert says in line
     assert line.count("\n") == 1
+
+
+@pytest.mark.parametrize(("options", "left"), [([], ["bus_off"]), (["--bus-goes-off"], [])])
+def test_a_bus_that_goes_off_itself_is_no_fault_of_the_car(
+    options: list[str], left: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def look(driven: Scenario) -> None:
+        assert [fault.kind for fault in driven.fault] == left
+        raise UserError("seen", "", "enough")
+
+    path = tmp_path / "off.toml"
+    path.write_text('[[phase]]\nkind = "coast"\nseconds = 1.0\n[[fault]]\nkind = "bus_off"\nt = 0.1\n')
+    monkeypatch.setattr(vehicle_node, "warm_up", look)
+    monkeypatch.setattr("signal.signal", lambda number, handler: None)
+    assert cli.main(["vehicle", str(path), "-i", "virtual", "-c", "x", *options]) == 2

@@ -4,6 +4,8 @@ without it."""
 from pathlib import Path
 from typing import Annotated
 
+from typer import Option
+
 from brakelab.cli.arguments import Plant, Scenario, Seed
 from brakelab.cli.bench import HELP as BENCH_HELP
 from brakelab.cli.bench import bench
@@ -86,6 +88,7 @@ def vehicle(
     config: Annotated[Path | None, CONFIG_OPTION] = None,
     truth: Annotated[Path | None, option("FILE.parquet", "True values of the drive, to write")] = None,
     alone: Annotated[bool, flag("--alone", "Set off at once, without waiting for an ECU")] = False,
+    bus_goes_off: Annotated[bool, Option("--bus-goes-off", hidden=True)] = False,
 ) -> None:
     """Drive the simulated car of a scenario alone on a bus.
 
@@ -94,7 +97,7 @@ def vehicle(
     from brakelab.rig import vehicle_node
 
     bus = interface, channel
-    vehicle_node.vehicle_command(scenario, bus, seed, plant, config, truth, alone)
+    vehicle_node.vehicle_command(scenario, bus, seed, plant, config, truth, alone, bus_goes_off)
 
 
 @app.command()

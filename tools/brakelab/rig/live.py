@@ -121,11 +121,11 @@ class Processes:
             RunFault: it did not start.
         """
         wire = self._bus.wire
-        command = [sys.executable, "-m", "brakelab.rig.vehicle_node", str(scenario)]
+        command = [sys.executable, "-m", "ecu.cli", "vehicle", str(scenario)]
         command += ["-i", self._bus.interface]
         command += ["-c", self._bus.channel] if wire is None else ["-c", wire.ends[1].name, "--bus-goes-off"]
         command += [] if plant is None else ["--plant", plant]
-        command += ["--with-ecu", "--seed", str(seed), "--truth", str(self.truth)]
+        command += ["--seed", str(seed), "--truth", str(self.truth)]
         self.vehicle = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=self._log, text=True, preexec_fn=end_with_parent
         )

@@ -1,15 +1,13 @@
 """Simulated vehicle as a process of its own on a real bus, in real time.
 
-`brake-ecu vehicle SCENARIO -i INTERFACE -c CHANNEL`, for the rig `python -m brakelab.rig.vehicle_node`, sends
-the vehicle's frames every 10 ms on absolute deadlines, takes the ECU's demands, and leaves when the scenario
-has ended or on SIGTERM. It prints `ready` when it is compiled and on the bus, and `driving NS` when it sets
-off: T_0 on the monotonic clock. Without valid demands for 30 ms its own hydraulics brake. The scenario's
-faults act on its sensors, on its actuators and on the frames of both directions.
+`brake-ecu vehicle SCENARIO -i INTERFACE -c CHANNEL` sends the vehicle's frames every 10 ms on absolute
+deadlines, takes the ECU's demands, and leaves when the scenario has ended or on SIGTERM. It prints `ready`
+when it is compiled and on the bus, and `driving NS` when it sets off: T_0 on the monotonic clock. Without
+valid demands for 30 ms its own hydraulics brake. The scenario's faults act on its sensors, on its actuators
+and on the frames of both directions.
 """
 
-import argparse
 import signal
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -27,7 +25,7 @@ from brakelab.simulation.closed_loop import Plans, plans
 from brakelab.simulation.fault_kernels import Link, deliver, new_link
 from brakelab.simulation.priority import ask_for_priority
 from brakelab.simulation.scenario import Scenario, load_scenario
-from brakelab.simulation.scenario_car import with_car, with_plant
+from brakelab.simulation.scenario_car import with_car
 from brakelab.simulation.simulate import write_columns
 from brakelab.simulation.vehicle_bus import (
     N_TRUTH,
@@ -51,7 +49,6 @@ from ecu.contract.signals import CYCLE_NS, N_OUTPUTS
 from ecu.errors import UserError
 from ecu.jit import kernel
 from ecu.runtime.clock import Grid, TimeSource, system_time
-from ecu.settings.resources import SCENARIOS, named
 
 RECEIVED_AT_ONCE: Final = 256
 SILENCE_CYCLES: Final = 50
@@ -232,86 +229,19 @@ def _ends(stop: list[int], written: Future[None] | None) -> bool:
     return bool(stop) or (written is not None and written.done() and written.exception() is not None)
 
 
-def _arguments(argv: list[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog="python -m brakelab.rig.vehicle_node",
-        description="The simulated vehicle on a bus, in real time.",
-    )
-    parser.add_argument("scenario", help="a scenario file, or a shipped one by name")
-    parser.add_argument("-i", "--interface", required=True, help="as python-can calls it")
-    parser.add_argument("-c", "--channel", required=True, help="as python-can calls it")
-    parser.add_argument("--seed", type=int, default=0, help="of the drawn car and its noise")
-    parser.add_argument("--plant", help="the car, a file or a shipped one by name; default: the scenario's")
-    parser.add_argument(
-        "--with-ecu", action="store_true", help="drive off when the ECU is heard, stay until it is silent"
-    )
-    parser.add_argument(
-        "--bus-goes-off", action="store_true", help="faults of the kind bus_off are the bus's affair"
-    )
-    parser.add_argument("--truth", type=Path, metavar="FILE", help="where to write what really happened")
-    return parser.parse_args(argv)
-
-
-def main(argv: list[str] | None = None) -> int:
-    """Run the process; return its exit code."""
-    arguments = _arguments(argv)
-    try:
-        drive_on_bus(
-            named(arguments.scenario, *SCENARIOS),
-            (arguments.interface, arguments.channel),
-            arguments.seed,
-            lambda scenario: _changed(scenario, arguments),
-            truth_file=arguments.truth,
-            with_ecu=arguments.with_ecu,
-        )
-    except UserError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
-
-
-def _changed(scenario: Scenario, arguments: argparse.Namespace) -> Scenario:
-    if arguments.bus_goes_off:
-        rest = [fault for fault in scenario.fault if fault.kind != "bus_off"]
-        scenario = scenario.model_copy(update={"fault": rest})
-    return with_plant(scenario, arguments.plant)
-
-
 def vehicle_command(
-    scenario: Path,
+    path: Path,
     bus: tuple[str, str],
     seed: int,
     plant: str | None,
     config: Path | None,
-    truth: Path | None,
-    alone: bool,
-) -> None:
-    """Drive the simulated car of a scenario on a bus. `alone`: without waiting for an ECU.
-
-    Raises:
-        UserError: a file is wrong or missing, the bus cannot be opened.
-    """
-    with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder:
-        drive_on_bus(
-            scenario,
-            bus,
-            seed,
-            lambda driven: with_car(driven, plant, config, Path(folder)),
-            truth_file=truth,
-            with_ecu=not alone,
-        )
-
-
-def drive_on_bus(
-    path: Path,
-    bus: tuple[str, str],
-    seed: int,
-    changed: Callable[[Scenario], Scenario],
-    *,
     truth_file: Path | None,
-    with_ecu: bool,
+    alone: bool,
+    bus_goes_off: bool,
 ) -> None:
-    """Drive the scenario of a file, `changed`, on a `bus` (interface, channel), to its end or a signal's.
+    """Drive the simulated car of a scenario on a `bus` (interface, channel), to its end or a signal's.
+
+    `alone`: without waiting for an ECU. `bus_goes_off`: faults of the kind bus_off are the bus's affair.
 
     Raises:
         UserError: the scenario or its car is wrong, the bus or the file of the truth cannot be opened.
@@ -323,27 +253,28 @@ def drive_on_bus(
 
     signal.signal(signal.SIGTERM, ask_to_stop)
     signal.signal(signal.SIGINT, ask_to_stop)
-    scenario = changed(load_scenario(path))
-    warm_up(scenario)
-    node = new_node(scenario, seed)
+    scenario = load_scenario(path)
+    if bus_goes_off:
+        rest = [fault for fault in scenario.fault if fault.kind != "bus_off"]
+        scenario = scenario.model_copy(update={"fault": rest})
+    with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder:
+        scenario = with_car(scenario, plant, config, Path(folder))
+        warm_up(scenario)
+        node = new_node(scenario, seed)
     listened = [int(identifier) for identifier in plans().vehicle_hears.ids]
     channel = open_channel(*bus, receive_ids=listened)
     ask_for_priority()
     print("ready", flush=True)
     source, stopped = system_time(), lambda: bool(stop)
-    if with_ecu:
+    if not alone:
         wait_for_ecu(node, channel, stopped)
     truth = drive_in_real_time(node, channel, source, stopped, _tell_set_off)
     with ThreadPoolExecutor(1) as beside:  # a car that writes is no car that is silent
         written: Future[None] | None = None
         if truth_file is not None:
             written = beside.submit(write_truth_file, truth_file, truth, path.stem, seed)
-        if with_ecu:
+        if not alone:
             stay_with_ecu(node, channel, source, len(truth.t), partial(_ends, stop, written))
     if written is not None:
         written.result()
     channel.close()
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
