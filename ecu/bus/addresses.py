@@ -1,8 +1,9 @@
-"""Identifiers of the diagnostic connection: request, response, and requests to all ECUs (ISO 15765-2)."""
+"""Addresses: identifiers of the diagnostic connection, request, response, to all (ISO 15765-2); IPv4."""
 
 import re
 import sys
 from collections.abc import Iterable
+from ipaddress import IPv4Address
 from typing import Any, Final, NamedTuple
 
 from ecu.contract.records import EXTENDED_ID
@@ -45,6 +46,14 @@ def parse_addresses(option: str, text: str) -> Addresses:
     if len(set(numbers)) < 3:
         raise UserError(option, text, "request, response and requests to all ECUs need an identifier each")
     return Addresses(*numbers)
+
+
+def check_ipv4(option: str, text: str, address: str) -> None:
+    """Raise UserError for an `option`, given as `text`, whose address is none."""
+    try:
+        IPv4Address(address)
+    except ValueError:
+        raise UserError(option, text, "give an IPv4 address, 127.0.0.1 or 0.0.0.0") from None
 
 
 def refuse_taken(option: str, numbers: Iterable[int], taken: set[int]) -> None:

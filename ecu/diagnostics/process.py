@@ -5,7 +5,7 @@ S]`. It follows the ring as any reader does, and loads what it needs once that i
 goes first. It ends with exit code 0 when the run has ended and the fault memory is stored.
 """
 
-import argparse
+import json
 import os
 from pathlib import Path
 
@@ -14,20 +14,16 @@ from ecu.runtime.companion import await_ring, begin_companion
 
 def main() -> int:
     """Serve until the run has ended or the parent has gone."""
-    parser = argparse.ArgumentParser(
-        prog="python -m ecu.diagnostics.process", description="Diagnostics of run."
-    )
-    parser.add_argument("--diagnostics", required=True)
-    parser.add_argument("--state", type=Path)
-    options, goes_on = begin_companion(parser)
+    options, goes_on = begin_companion("ecu.diagnostics.process", "--diagnostics", "--state")
     if not await_ring(options.ring, goes_on):
         return 0
     from ecu.diagnostics.serve import serve
     from ecu.recording.log import configure_logging
-    from ecu.runtime.diagnostics import read_settings
+    from ecu.runtime.diagnostics import Settings
 
     configure_logging()
-    serve(options.ring, options.state, read_settings(options.diagnostics), goes_on)
+    state = Path(options.state) if options.state else None
+    serve(options.ring, state, Settings(*json.loads(options.diagnostics)), goes_on)
     return 0
 
 

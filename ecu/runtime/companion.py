@@ -4,7 +4,6 @@ The supervisor starts one again when it ends, ever later while it ends soon; wit
 """
 
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -14,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from ecu.recording.sink import free_output
-from ecu.runtime.start import ENDING, lower_priority
+from ecu.runtime.start import leave_signals, lower_priority
 
 if TYPE_CHECKING:  # the supervisor imports next to nothing
     import argparse
@@ -60,20 +59,22 @@ class Companion:
         self._process.wait()
 
 
-def begin_companion(
-    parser: "argparse.ArgumentParser",
-) -> "tuple[argparse.Namespace, Callable[[], bool]]":
+def begin_companion(module: str, *own: str) -> "tuple[argparse.Namespace, Callable[[], bool]]":
     """In the process of a `Companion`: take its options, leave priority and signals to the loop, and pause.
 
-    `parser` has the options of its own. Returns all of them, and a check whether the supervisor is there.
+    `own`: options of the module. Returns all of them, and a check whether the supervisor is there.
     """
+    import argparse
+
+    parser = argparse.ArgumentParser(prog=f"python -m {module}")
+    for name in own:
+        parser.add_argument(name)
     parser.add_argument("--ring", type=Path, required=True)
     parser.add_argument("--parent", type=int, required=True)
     parser.add_argument("--pause", type=float, default=0.0)
     options = parser.parse_args()
     free_output()
-    for number in ENDING:
-        signal.signal(number, signal.SIG_IGN)
+    leave_signals()
     lower_priority()
     time.sleep(options.pause)
     return options, lambda: os.getppid() == options.parent

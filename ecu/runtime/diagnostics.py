@@ -22,20 +22,11 @@ class Settings(NamedTuple):
     addresses: str
     key: str
 
-    def word(self) -> str:
-        """Return them as an argument of a process."""
-        return json.dumps(self)
-
-
-def read_settings(word: str) -> Settings:
-    """Return what `Settings.word` wrote."""
-    return Settings(*json.loads(word))
-
 
 def checked_settings(
     interface: str, channel: str, addresses: str | None, key: Path | None, taken: set[int], silent: bool
 ) -> str | None:
-    """Return the settings as a word, None where no diagnostics are asked for.
+    """Return the settings as JSON, an argument of the process; None where no diagnostics are asked for.
 
     Args:
         interface: of the run.
@@ -61,7 +52,7 @@ def checked_settings(
     refuse_taken(OPTION, parse_addresses(OPTION, addresses), taken)
     if key is not None:
         read_secret(key)
-    return Settings(interface, channel, addresses, "" if key is None else str(key.absolute())).word()
+    return json.dumps(Settings(interface, channel, addresses, "" if key is None else str(key.absolute())))
 
 
 def identifiers(addresses: str | None) -> set[int]:

@@ -6,7 +6,6 @@ with released brakes. What it refuses is asked for again until it is done. Work 
 in what it learned from that ring.
 """
 
-import argparse
 import os
 import time
 from pathlib import Path
@@ -93,10 +92,7 @@ def _speaks(reader: RingReader) -> bool:
 
 def main() -> int:
     """Follow until the run has ended or the parent has gone."""
-    parser = argparse.ArgumentParser(
-        prog="python -m ecu.runtime.follow_first", description="Work of a workshop, on a standby."
-    )
-    options, goes_on = begin_companion(parser)
+    options, goes_on = begin_companion("ecu.runtime.follow_first")
     if not await_ring(options.ring, goes_on):
         return 0
     from ecu.recording.log import configure_logging

@@ -9,7 +9,6 @@ import os
 import sys
 import time
 from importlib.util import find_spec
-from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -18,6 +17,7 @@ import structlog
 
 from ecu import __version__
 from ecu.algorithm.step import INITIAL, initial_part
+from ecu.bus.addresses import check_ipv4
 from ecu.bus.channel import open_channel
 from ecu.bus.e2e import NO_CHECKSUM
 from ecu.bus.foreign import KNOWN_BY, discard, listen_before_send
@@ -222,10 +222,7 @@ def _check_metrics(place: str) -> None:
         install = f"{sys.executable} -m pip install prometheus-client"
         raise UserError("--metrics-port", "", f"needs prometheus-client: {install}")
     address = place.rpartition(":")[0]
-    try:
-        IPv4Address(address)
-    except ValueError:
-        raise UserError("--metrics-address", address, "give an IPv4 address, 127.0.0.1 or 0.0.0.0") from None
+    check_ipv4("--metrics-address", address, address)
 
 
 def _restored(folder: Path | None, config: Config, params: RecordArray) -> RecordArray | None:

@@ -12,7 +12,6 @@ import argparse
 import math
 import os
 import select
-import signal
 import socket
 import sqlite3
 import sys
@@ -43,7 +42,7 @@ from ecu.recording.revisions import DAMAGED
 from ecu.recording.ring import Batch, RingReader, remove_ring
 from ecu.recording.sink import free_output
 from ecu.runtime.side import KEPT, NOT_KEPT, READY, REFUSED, word
-from ecu.runtime.start import ENDING, lower_priority
+from ecu.runtime.start import leave_signals, lower_priority
 from ecu.runtime.supervisor import become
 
 PERIOD_S: Final = 0.1
@@ -264,8 +263,7 @@ def main() -> int:
     parser.add_argument("--again", action="store_true")
     options = parser.parse_args()
     free_output()
-    for number in ENDING:
-        signal.signal(number, signal.SIG_IGN)
+    leave_signals()
     configure_logging()
     leash = socket.socket(fileno=options.leash)
     while not options.ring.exists():

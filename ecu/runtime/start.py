@@ -26,8 +26,14 @@ OUT_OF_REACH: Final = _signals("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFP
 ENDING: Final = tuple(
     sorted({int(one) for one in signal.valid_signals()} - IGNORED - HARMLESS - OUT_OF_REACH)
 )
-"""All other signals. They end a run in order; a group's are left to the loop by its side processes."""
+"""All other signals. They end a run in order."""
 PRIORITY: Final = 1  # of SCHED_FIFO: above every ordinary process, below every real-time one
+
+
+def leave_signals() -> None:
+    """Ignore the signals by which a run ends: a group's are left to the loop by its side processes."""
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def signal_name(number: int) -> str:

@@ -9,7 +9,6 @@ supervisor died becomes one itself (`become`). With `--metrics ADDRESS:PORT`, `-
 import json
 import os
 import select
-import signal
 import socket
 import subprocess
 import sys
@@ -21,7 +20,7 @@ from typing import Final, NoReturn
 from ecu.recording.sink import free_output
 from ecu.runtime.companion import Companion, await_end_of
 from ecu.runtime.side import AWAY
-from ecu.runtime.start import ENDING, lower_priority
+from ecu.runtime.start import leave_signals, lower_priority
 
 PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 10.0  # less than the ring holds
@@ -34,22 +33,13 @@ XCP_PATIENCE_S: Final = 0.5  # it sends the last cycles
 def main(arguments: Sequence[str]) -> int:
     """Keep a recorder alive as long as the loop lives; return its last exit code."""
     free_output()
-    for number in ENDING:
-        signal.signal(number, signal.SIG_IGN)
+    leave_signals()
     leash = socket.socket(fileno=int(arguments[0]))
     leash.setblocking(False)
     again = "--again" in arguments
     rest = [argument for argument in arguments[1:] if argument != "--again"]
-    command = [
-        sys.executable,
-        "-m",
-        "ecu.runtime.side_process",
-        "--leash",
-        arguments[0],
-        "--parent",
-        str(os.getpid()),
-        *rest,
-    ]
+    command = [sys.executable, "-m", "ecu.runtime.side_process"]
+    command += ["--leash", arguments[0], "--parent", str(os.getpid()), *rest]
     companions = _companions(rest)
     pause_s, loop_is_gone = PAUSE_S, False
     while True:

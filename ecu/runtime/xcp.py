@@ -3,11 +3,10 @@
 import json
 import re
 from collections.abc import Iterable
-from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from ecu.bus.addresses import parse_addresses, refuse_taken
+from ecu.bus.addresses import check_ipv4, parse_addresses, refuse_taken
 from ecu.errors import UserError
 from ecu.runtime.diagnostics import read_secret
 
@@ -46,10 +45,7 @@ def parse_transport(text: str) -> Transport:
     address, _, port = rest.rpartition(":")
     if kind not in ("udp", "tcp") or not re.fullmatch(r"[0-9]{1,5}", port) or not 0 < int(port) < 1 << 16:
         raise UserError(OPTION, text, REMEDY)
-    try:
-        IPv4Address(address or LOOPBACK)
-    except ValueError:
-        raise UserError(OPTION, text, "give an IPv4 address, 127.0.0.1 or 0.0.0.0") from None
+    check_ipv4(OPTION, text, address or LOOPBACK)
     return Transport(kind, address or LOOPBACK, int(port))
 
 
@@ -72,15 +68,6 @@ class Settings(NamedTuple):
     key: str = ""
     save: str = ""
 
-    def word(self) -> str:
-        """Return them as an argument of a process."""
-        return json.dumps(self)
-
-
-def read_settings(word: str) -> Settings:
-    """Return what `Settings.word` wrote."""
-    return Settings(*json.loads(word))
-
 
 def checked_settings(
     transport: str | None,
@@ -91,7 +78,7 @@ def checked_settings(
     calibrating: Calibrating,
     inputs: Iterable[Path],
 ) -> str | None:
-    """Return the settings as a word, None where no XCP is asked for.
+    """Return the settings as JSON, an argument of the process; None where no XCP is asked for.
 
     Args:
         transport: as given.
@@ -123,7 +110,7 @@ def checked_settings(
             raise UserError(OPTION, transport, remedy)
         refuse_taken(OPTION, (found.request, found.response), taken)
     files = ("" if path is None else str(path.absolute()) for path in calibrating)
-    return Settings(transport, interface, channel, *files).word()
+    return json.dumps(Settings(transport, interface, channel, *files))
 
 
 def _check_save(save: Path, inputs: Iterable[Path]) -> None:

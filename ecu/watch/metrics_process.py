@@ -13,7 +13,6 @@ if __name__ == "__main__":  # the daemon is starting: it goes first
     lower_priority()
     os.nice(10)
 
-import argparse
 import threading
 import time
 from collections.abc import Callable
@@ -119,11 +118,7 @@ def open_server(place: str, handler: type[Handler], goes_on: Callable[[], bool])
 
 def main() -> int:
     """Serve until the parent has gone."""
-    parser = argparse.ArgumentParser(
-        prog="python -m ecu.watch.metrics_process", description="Metrics of run."
-    )
-    parser.add_argument("--metrics", required=True)
-    options, goes_on = begin_companion(parser)
+    options, goes_on = begin_companion("ecu.watch.metrics_process", "--metrics")
     configure_logging()
     shared = Shared(options.ring)
     server = open_server(options.metrics, new_handler(shared), goes_on)

@@ -4,7 +4,7 @@
 reader does. It ends with exit code 0 when the run has ended.
 """
 
-import argparse
+import json
 import os
 
 from ecu.runtime.companion import await_ring, begin_companion
@@ -12,17 +12,15 @@ from ecu.runtime.companion import await_ring, begin_companion
 
 def main() -> int:
     """Serve until the run has ended or the parent has gone."""
-    parser = argparse.ArgumentParser(prog="python -m ecu.xcp.process", description="XCP of run.")
-    parser.add_argument("--xcp", required=True)
-    options, goes_on = begin_companion(parser)
+    options, goes_on = begin_companion("ecu.xcp.process", "--xcp")
     if not await_ring(options.ring, goes_on):
         return 0
     from ecu.recording.log import configure_logging
-    from ecu.runtime.xcp import read_settings
+    from ecu.runtime.xcp import Settings
     from ecu.xcp.serve import serve
 
     configure_logging()
-    serve(options.ring, read_settings(options.xcp), goes_on)
+    serve(options.ring, Settings(*json.loads(options.xcp)), goes_on)
     return 0
 
 

@@ -1,5 +1,6 @@
 """What `run --diagnostics` is refused for before it starts, and the arguments of its process."""
 
+import json
 import sys
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import pytest
 
 from ecu.errors import UserError
 from ecu.runtime import diagnostics
-from ecu.runtime.diagnostics import Settings, checked_settings, read_secret, read_settings
+from ecu.runtime.diagnostics import Settings, checked_settings, read_secret
 
 
 def key_file(folder, text="00112233445566778899aabbccddeeff\n", mode=0o600):
@@ -20,7 +21,7 @@ def key_file(folder, text="00112233445566778899aabbccddeeff\n", mode=0o600):
 def test_what_is_checked_reaches_the_process(tmp_path):
     key = key_file(tmp_path)
     word = checked_settings("socketcan", "can 0", "7E0:7E8", key, {0x50}, silent=False)
-    assert read_settings(word) == Settings("socketcan", "can 0", "7E0:7E8", str(key))
+    assert Settings(*json.loads(word)) == Settings("socketcan", "can 0", "7E0:7E8", str(key))
     assert read_secret(key) == bytes.fromhex("00112233445566778899aabbccddeeff")
 
 

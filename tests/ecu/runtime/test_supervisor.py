@@ -35,7 +35,7 @@ def test_it_is_started_again_with_pauses_that_grow(codes, gone_after, starts, pa
     monkeypatch.setattr(supervisor.subprocess, "Popen", start)
     monkeypatch.setattr(supervisor.select, "select", wait)
     monkeypatch.setattr(supervisor, "free_output", lambda: None)
-    monkeypatch.setattr(supervisor.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(supervisor, "leave_signals", lambda: None)
     monkeypatch.setattr(supervisor, "lower_priority", lambda: None)
     assert supervisor.main([str(theirs.detach()), "--ring", "x"]) == codes[starts - 1]
     assert len(commands) == starts
@@ -76,7 +76,7 @@ def test_what_is_asked_for_is_served_by_a_process_beside_the_recorder(asked, mod
     monkeypatch.setattr(supervisor, "await_end_of", lambda recorder, companions: 0)
     monkeypatch.setattr(supervisor.subprocess, "Popen", lambda command, pass_fds: said.append(command))
     monkeypatch.setattr(supervisor, "free_output", lambda: None)
-    monkeypatch.setattr(supervisor.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(supervisor, "leave_signals", lambda: None)
     assert supervisor.main([str(theirs.detach()), "--ring", "x", *asked]) == 0
     assert said[0] == (module, ["--ring", "x", *given])
     assert said[1][-len(asked) :] == asked

@@ -1,5 +1,6 @@
 """What `run --xcp` is refused for before it starts, and the arguments of its process."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,6 @@ from ecu.runtime.xcp import (
     Transport,
     checked_settings,
     parse_transport,
-    read_settings,
 )
 
 NOTHING = Calibrating()
@@ -71,13 +71,13 @@ def test_a_transport_that_is_none_is_one_line(text, says):
 
 def test_what_is_checked_reaches_the_process():
     word = checked("can:0x7A0:0x7A8", channel="can 0")
-    assert read_settings(word) == Settings("can:0x7A0:0x7A8", "socketcan", "can 0")
+    assert Settings(*json.loads(word)) == Settings("can:0x7A0:0x7A8", "socketcan", "can 0")
 
 
 def test_files_of_calibration_reach_it_whole(key, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     word = checked("udp:5555", calibrating=Calibrating(Path("key"), Path("new.toml")))
-    assert read_settings(word)[3:] == (str(tmp_path / "key"), str(tmp_path / "new.toml"))
+    assert Settings(*json.loads(word))[3:] == (str(tmp_path / "key"), str(tmp_path / "new.toml"))
 
 
 def test_what_a_calibration_wrote_it_may_renew_unless_the_run_reads_it(key, tmp_path):
