@@ -42,6 +42,7 @@ from ecu.runtime.side_process import Recorder
 from ecu.runtime.warm_up import warm_up
 from ecu.settings.config import new_params, store_key
 from ecu.settings.resources import resource
+from ecu.watch.daemons import pid_of
 
 HOUR: Final = 360_000  # cycles
 RESTART: Final = 6 * HOUR + 7  # no multiple of 15: its E2E counters start at another value
@@ -263,7 +264,7 @@ class Looks:
         if now_s < self._next_s:
             return
         self._next_s = now_s + 1.0
-        for pid in _family(int(reader.ring.path.name.split(".")[2])):
+        for pid in _family(pid_of(reader.ring.path)):
             self.samples.setdefault(pid, []).append(resident_mb(pid))
 
 
