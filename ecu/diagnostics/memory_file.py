@@ -33,7 +33,6 @@ PATIENCE_S: Final = 5.0
 LOOK_AGAIN_S: Final = 0.1
 FILE: Final = "faults.sqlite"
 LOCK: Final = "faults-in-use"
-_FIELDS: Final = ("status", "occurrences", "ageing", "first", "last")
 
 
 class Place(NamedTuple):

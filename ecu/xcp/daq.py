@@ -29,8 +29,6 @@ EVENT_CYCLE: Final = 0
 """The only event channel: a cycle of the loop."""
 
 TIMESTAMP: Final = 0x10
-DIRECTION_STIM: Final = 0x02
-PID_OFF: Final = 0x20
 _FREE, _LISTS, _ODTS, _ENTRIES = range(4)
 
 

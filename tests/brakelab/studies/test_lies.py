@@ -96,7 +96,6 @@ def test_when_the_lie_is_reported_and_as_what(faults, named, late, first) -> Non
     found = cell(share=0.9, lost=(1.0, 5.0), faults=faults)
     assert (found.named_s, found.late_s) == pytest.approx((named, late), nan_ok=True, abs=0.011)
     assert found.first == first
-    assert found.others == sum(bit for bit in faults if bit != OWN)
 
 
 NAMES = [
@@ -115,7 +114,7 @@ def test_the_faults_that_name_an_input(signal: str, bit: int, named: bool) -> No
 
 def test_what_the_sound_car_tells_is_an_alarm_and_not_the_lie_s() -> None:
     found = cell(drive(faults={OTHER: 12.0, WHEEL_SLIPS: 12.0}), faults={OTHER: 12.0, OWN: 25.0})
-    assert (found.alarms, found.first, found.others) == (OTHER, OWN, 0)
+    assert (found.alarms, found.first) == (OTHER, OWN)
 
 
 CAUSES = [

@@ -60,12 +60,8 @@ class StopResult(NamedTuple):
     level: float
     temperature: float  # degC, demanded
     start_temperature: float  # degC, reached by the gate
-    gate_seconds: float
-    seconds: float
     end_temperature: float  # degC
-    peak_pressure: float  # bar
     mean_by_distance: float
-    mean_by_time: float
 
 
 class Gated(NamedTuple):
@@ -111,36 +107,13 @@ def run_programme(programme: Programme, rig: RecordArray) -> list[StopResult]:
     temperature = float(rig[0]["ambient"])
     for wanted, speed, level in product(programme.temperature, programme.speed, programme.level):
         gated = bring_to(rig, programme.gate, temperature, wanted)
+        ends = KMH * speed, KMH * programme.end_speed, gated.temperature
         if programme.control == "pressure":
-            stop = new_stop(
-                PRESSURE,
-                KMH * speed,
-                KMH * programme.end_speed,
-                gated.temperature,
-                pressure=BAR * level,
-            )
+            stop = new_stop(PRESSURE, *ends, pressure=BAR * level)
         else:
-            stop = new_stop(
-                DECELERATION,
-                KMH * speed,
-                KMH * programme.end_speed,
-                gated.temperature,
-                deceleration=level,
-            )
+            stop = new_stop(DECELERATION, *ends, deceleration=level)
         trace = run_stop(rig, stop)
         temperature = float(trace["temperature"][-1])
-        results.append(
-            StopResult(
-                speed,
-                level,
-                wanted,
-                gated.temperature,
-                gated.seconds,
-                len(trace) * STEP,
-                temperature,
-                float(trace["pressure"].max()) / BAR,
-                mean_friction(trace, by_distance=True),
-                mean_friction(trace, by_distance=False),
-            )
-        )
+        mean = mean_friction(trace, by_distance=True)
+        results.append(StopResult(speed, level, wanted, gated.temperature, temperature, mean))
     return results

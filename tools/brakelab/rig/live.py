@@ -101,8 +101,6 @@ class Recorded(NamedTuple):
     truth: Path
     recordings: list[Path]
     """Of the daemons that drove, in the order of their starts; a standby's last."""
-    exits: list[int]
-    """How each daemon ended, in the order of their starts: an exit code, or minus the signal."""
 
 
 class Processes:
@@ -215,7 +213,7 @@ def drive(
     if not processes.truth.exists():
         raise RunFault(f"the vehicle ended early; {log} says why")
     recordings = [path.parent for name in ("drive", "standby") for path in _recordings(out / name)]
-    return Recorded(processes.truth, recordings, exits)
+    return Recorded(processes.truth, recordings)
 
 
 def _recordings(folder: Path) -> list[Path]:

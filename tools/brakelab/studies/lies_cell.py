@@ -72,12 +72,6 @@ class Cell(NamedTuple):
     costs: bool
     first: int
     """Mask of the faults that come first and are not there in the sound car."""
-    degraded: float
-    """Share of the time in mode degraded or failed."""
-    locked_s: float
-    """A wheel slips by more than 0.3 above 5 m/s, beyond what it does in the sound car."""
-    others: int
-    """Mask of the faults that neither name the input nor are there in the sound car."""
     alarms: int
     """Mask of the inputs that the ECU of the sound car doubts."""
     cause: Cause
@@ -194,9 +188,7 @@ def judge(
             farthest, place, beside = float(strays[worst]), rows[window], reference[window]
     after = drive.t >= BEGIN
     t, masks, usual = drive.t[after], _masks(drive)[after], int(np.bitwise_or.reduce(_masks(sound)))
-    own = _named(signals)
-    named, _ = _first(t, masks & own)
-    mode = drive.outputs["mode"][after]
+    named, _ = _first(t, masks & _named(signals))
     return Cell(
         *name,
         least_short=float(min(short)),
@@ -209,14 +201,6 @@ def judge(
         late_s=max(named - costly, 0.0) if np.isfinite(costly) else np.nan,
         costs=bool(np.isfinite(costly)),
         first=_first(t, masks & ~usual)[1],
-        degraded=float(np.mean(mode >= 3.0)),
-        locked_s=max(_locked(drive) - _locked(sound), 0.0),
-        others=int(np.bitwise_or.reduce(masks)) & ~own & ~usual,
         alarms=usual & sum(IMPLAUSIBLE.values()),
         cause=_cause(drive, sound, place, beside),
     )
-
-
-def _locked(drive: Drive) -> float:
-    fast = drive.truth["vehicle_speed"] > LOWEST_SPEED
-    return 0.01 * max(float(np.sum(fast & (drive.truth[f"slip_{c}"] < -0.3))) for c in CORNERS)

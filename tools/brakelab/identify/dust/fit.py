@@ -54,8 +54,6 @@ class Kpis(NamedTuple):
     """Share of applications whose EF lies in the interval."""
     known: float
     """Share of the work within the training range."""
-    known_sum_error: float
-    """Of applications within the training range."""
 
 
 def ranges(trips: list[Applications]) -> tuple[Array, Array]:
@@ -104,7 +102,6 @@ def kpis(
         float(np.sqrt(np.mean(off**2)) / measured.mean()),
         float(np.mean((off >= interval[0]) & (off <= interval[1]))),
         float(energy[within].sum() / energy.sum()),
-        float(said[within].sum() / counted[within].sum() - 1.0),
     )
 
 

@@ -4,7 +4,6 @@ Rig, stops, disc and gates are those of `plant/dynamometer.py`; what is recorded
 times a second, from the beginning of a stop to its end (3.2).
 """
 
-from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -30,9 +29,6 @@ from brakelab.plant.records import RecordArray
 PAUSE: Final = 5.0  # s between recorded stops, at least
 CYCLE_LAW: Final = "SIM"
 """The law of the lining file whose rig mass the flywheel has."""
-
-RunStop = Callable[[RecordArray], RecordArray]
-"""Trace of a stop, dtype TRACE, of the brake on the rig."""
 
 
 class Noise(NamedTuple):

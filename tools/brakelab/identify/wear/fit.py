@@ -54,7 +54,6 @@ class Fit(NamedTuple):
     criterion: float
     """Least AICc of the sets."""
     rank: int
-    condition: float
 
 
 def _scaled(regressors: Array) -> tuple[Array, Array]:
@@ -63,16 +62,15 @@ def _scaled(regressors: Array) -> tuple[Array, Array]:
     return regressors / scale, scale
 
 
-def rank_of(regressors: Array) -> tuple[int, float]:
-    """Return the numerical rank of the regressors, shape (n, 7), and their condition number.
+def rank_of(regressors: Array) -> int:
+    """Return the numerical rank of the regressors, shape (n, 7).
 
     Rows count by their direction: a block twice as long adds no information.
     """
     rows = regressors / regressors[:, :1]
     columns, _ = _scaled(rows)
     singular = np.linalg.svd(columns, compute_uv=False)
-    rank = int(np.count_nonzero(singular > LEAST_SINGULAR * singular[0]))
-    return rank, float(singular[0] / max(singular[-1], 1e-300))
+    return int(np.count_nonzero(singular > LEAST_SINGULAR * singular[0]))
 
 
 def _solve(regressors: Array, mass: Array, sigma: Array, terms: tuple[int, ...]) -> Array:
@@ -119,7 +117,7 @@ def fit_law(
     """
     if len(mass) < 3:
         raise UserError("blocks", str(len(mass)), "too few to tell one law from another; give 3 or more")
-    rank, condition = rank_of(regressors[:, allowed])
+    rank = rank_of(regressors[:, allowed])
     if rank < 2:
         raise UserError(
             "blocks",
@@ -148,9 +146,7 @@ def fit_law(
     elsewhere = float(np.max(np.std(drawn @ roads.T, axis=0) / (roads @ coefficients)))
     spread = float(np.sum((mass - mass.mean()) ** 2))
     r2 = 1.0 - float(np.sum((mass - predicted) ** 2)) / spread
-    return Fit(
-        coefficients, low, high, predicted, left_out, elsewhere, scatter, r2, criterion, rank, condition
-    )
+    return Fit(coefficients, low, high, predicted, left_out, elsewhere, scatter, r2, criterion, rank)
 
 
 def _warmer(regressors: Array, kelvin: float) -> Array:
