@@ -46,9 +46,7 @@ _UNWRITABLE = {errno.EACCES, errno.EPERM, errno.EROFS}
 _REMEDY = "set NUMBA_CACHE_DIR to a folder of yours"
 
 _COMMENT = re.compile(rb"#[^\n]*|\\\n")
-_FROM = re.compile(
-    rb"(?:^|[;:])[ \t]*from\b[ \t]*([.\w]+)[ \t]+import\b[ \t]*(\([^)]*\)|[^\n;]*)", re.MULTILINE
-)
+_FROM = re.compile(rb"(?m)(?:^|[;:])[ \t]*from\b[ \t]*([.\w]+)[ \t]+import\b[ \t]*(\([^)]*\)|[^\n;]*)")
 _KERNEL = re.compile(rb"^@(?:parallel_|batch_)?kernel\b", re.MULTILINE)
 _IMPORT = re.compile(rb"(?:^|[;:])[ \t]*import\b([^\n;]*)", re.MULTILINE)
 
@@ -183,6 +181,8 @@ def compiler() -> ModuleType:
         import numba
         import numba.core.event as event
         from numba.core import caching
+
+        from ecu.unboxing import take_records_by_address
     except ImportError:
         remedy = f"{sys.executable} -m pip install numba"
         raise UserError("numba", "", f"is not installed, and has to compile a kernel: {remedy}") from None
@@ -197,6 +197,7 @@ def compiler() -> ModuleType:
 
     event.register("numba:compile", Begins())
     caching._CacheLocator.ensure_cache_path = _make_folder
+    take_records_by_address()
     return numba
 
 
@@ -271,8 +272,7 @@ def kernel(function: Function, parallel: bool = False, nogil: bool = False) -> F
     What numba compiles is cached on disk. `nogil`: other threads run meanwhile.
 
     Raises:
-        UserError: there is no place for the cache, or others can write to it; when it is called: it has to be
-            compiled, and its place is read-only.
+        UserError: there is no place for the cache, others can write to it; when called: it is read-only.
     """
     if interprets():
         return interpreted(function)
