@@ -138,6 +138,7 @@ def test_friction_that_falls_with_pressure_is_no_wrong_unit(logged: dict[tuple[i
         assert contradictions(carbon, lengths) == [], car
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("what", "change", "begins", "least"), WRONG, ids=[row[0] for row in WRONG])
 def test_a_contradiction_is_reported(
     logged: dict[tuple[int, int], Logged], what: str, change: Change, begins: str, least: int

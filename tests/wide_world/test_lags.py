@@ -47,6 +47,7 @@ def test_the_lag_of_a_logger_is_found(logged: list[tuple[Stranger, np.ndarray]])
         assert abs(error) < 0.02
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("added", ADDED)
 def test_an_added_lag_is_found(logged: list[tuple[Stranger, np.ndarray]], added: float) -> None:
     for one, samples in logged:
