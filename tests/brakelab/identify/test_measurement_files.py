@@ -1,4 +1,4 @@
-"""Tables of measurements by their endings, in capitals as well."""
+"""Tables of measurements: by their endings, in capitals as well, and what is a number in them."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 import pytest
 
-from brakelab.identify.measurement_files import open_campaign, read_columns
+from brakelab.identify.measurement_files import numbers_in, numbers_of, open_campaign, read_columns
 from ecu.errors import UserError
 from ecu.settings.resources import resource
 
@@ -114,3 +114,16 @@ def test_a_measurement_counts_once(tmp_path: Path, rows: tuple[str, ...], line: 
         UserError, match=f"manifest.csv: {line}: the same measurement as line 2; leave one of them out"
     ):
         open_campaign(manifest, resource("config/suv.toml"), "front", tmp_path / "out.toml")
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        ["1.5", "-3e-5", "0.1", "4.9e-324", "-0.0", "1e400", ".5", "5."],
+        ["1", None, "nan", "inf", "-Infinity"],
+        [" 1", "+2", "1_0", "1,5", "0x10", "1d5", "nan(1)", "x"],
+        ["10:23:45.1", "2"],
+    ],
+)
+def test_a_column_has_the_numbers_of_its_cells(cells: list[str | None]) -> None:
+    np.testing.assert_array_equal(numbers_in(pa.array(cells, pa.string())), numbers_of(cells))

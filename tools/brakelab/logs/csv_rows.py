@@ -6,6 +6,7 @@ counted; a last line that is not whole is not used.
 """
 
 import io
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -19,6 +20,7 @@ from brakelab.logs.log_quality import Damage
 from ecu.errors import UserError
 
 BLOCK_BYTES: Final = 1 << 20
+_BLANK: Final = re.compile(rb"(?m)^\r?\n")
 _NO_SAMPLE: Final = ["", "null", "NULL", "NA"]
 
 
@@ -98,12 +100,14 @@ def _parsed(
     damage: Damage,
 ) -> tuple[NDArray[np.int64], pa.RecordBatch]:
     """Parse whole lines, of which the first has the number `line`."""
-    pieces = text.split(b"\n")[:-1]
     # A quote that is never closed would swallow all that follows, a CR alone would end a line.
     if b'"' in text or text.count(b"\r") != text.count(b"\r\n"):
+        pieces = text.split(b"\n")[:-1]
         pieces = [b"?" if piece.count(b'"') % 2 or b"\r" in piece[:-1] else piece for piece in pieces]
         text = b"\n".join(pieces) + b"\n"
-    lines = line + np.flatnonzero([len(piece) > piece.endswith(b"\r") for piece in pieces])
+    lines = line + np.arange(text.count(b"\n"))
+    if _BLANK.search(text):
+        lines = lines[[len(piece) > piece.endswith(b"\r") for piece in text.split(b"\n")[:-1]]]
     wrong: list[tuple[int, int]] = []
 
     def skip(row: pa_csv.InvalidRow) -> Literal["skip"]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from brakelab.arrays import Vector
 from brakelab.identify.friction.columns import ENDS, Columns, load_columns
 from brakelab.identify.friction.recording import NAMES, Recording
-from brakelab.identify.measurement_files import header_of, numbers_of
+from brakelab.identify.measurement_files import header_of, numbers_in
 from brakelab.identify.samples import alone, continued
 from brakelab.identify.units import UNITS, ZEROS
 from brakelab.logs.csv_rows import csv_rows
@@ -161,7 +161,7 @@ def _rows(
     found, delimiter, above, _ = header_of(path, names)
     _refuse_missing(path, read, found)
     for lines, batch in csv_rows(path, found, delimiter, read, damage, above):
-        cells = {name: numbers_of(batch.column(name).to_pylist()) for name in dict.fromkeys(names)}
+        cells = {name: numbers_in(batch.column(name)) for name in dict.fromkeys(names)}
         labels = _labels(batch.column(section).to_pylist() if section else [""] * len(lines))
         yield lines, np.array([cells[name] for name in names]), labels
 
