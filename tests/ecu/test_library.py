@@ -225,18 +225,6 @@ def test_a_changed_text_is_compiled_and_a_changed_comment_elsewhere_is_not(packa
     assert package.results() == (before, False)
 
 
-def test_a_module_that_is_run_calls_its_kernels_too(package: Package) -> None:
-    (package.folder / "laws.py").write_text(
-        LAWS + "\nif __name__ == '__main__':\n    import sys\n"
-        "    print(pair(Pair(np.ones(4), 2.0)), 'numba' in sys.modules)\n"
-    )
-    package.make()
-    run = "import runpy; runpy.run_module('thrown_away.laws', run_name='__main__', alter_sys=True)"
-    assert package.run(run).split() == ["24.0", "False"]
-    package.write(LAWS)
-    package.make()
-
-
 def test_a_damaged_library_is_left_aside(package: Package) -> None:
     manifest = package.folder / library.FOLDER / library.MANIFEST
     whole = manifest.read_bytes()
@@ -245,6 +233,17 @@ def test_a_damaged_library_is_left_aside(package: Package) -> None:
         assert package.results()[1]
     finally:
         manifest.write_bytes(whole)
+
+
+def test_a_module_that_is_run_calls_its_kernels_too(package: Package) -> None:
+    """The last of this package: its text is another then."""
+    (package.folder / "laws.py").write_text(
+        LAWS + "\nif __name__ == '__main__':\n    import sys\n"
+        "    print(pair(Pair(np.ones(4), 2.0)), 'numba' in sys.modules)\n"
+    )
+    package.make()
+    run = "import runpy; runpy.run_module('thrown_away.laws', run_name='__main__', alter_sys=True)"
+    assert package.run(run).split() == ["24.0", "False"]
 
 
 @pytest.mark.parametrize(
