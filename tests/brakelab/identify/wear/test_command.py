@@ -5,6 +5,8 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pa_csv
 import pytest
 
 from brakelab.identify.wear.command import identify_wear
@@ -37,6 +39,14 @@ def blocks(made, tmp_path) -> Path:
     return tmp_path / "blocks"
 
 
+@pytest.fixture(scope="session")
+def plain(made, tmp_path_factory) -> Path:
+    """The configuration of the blocks as they are, its page beside it."""
+    out = tmp_path_factory.mktemp("plain") / "car.toml"
+    identify_wear(made / "manifest.csv", CONFIG, "front", out)
+    return out
+
+
 def test_a_programme_becomes_a_configuration_and_a_page(blocks, capsys):
     out = blocks / "car.toml"
     identify_wear(blocks / "manifest.csv", CONFIG, "front", out)
@@ -50,12 +60,11 @@ def test_a_programme_becomes_a_configuration_and_a_page(blocks, capsys):
     assert "4 blocks" in capsys.readouterr().out
 
 
-def test_what_a_gram_is_worth_is_taken_from_the_blocks(blocks):
+def test_what_a_gram_is_worth_is_taken_from_the_blocks(plain):
     """Pads lose K g/mm: measured, it is the density of the lining on board, whose area is CONFIG's."""
-    identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "car.toml")
-    page = (blocks / "car.md").read_text()
+    page = plain.with_suffix(".md").read_text()
     slope = float(page.partition("linear wear K: ")[2].partition(" ± ")[0])
-    pad = load_config(blocks / "car.toml").front.pad
+    pad = load_config(plain).front.pad
     assert 2.0 * pad.density * pad.area == pytest.approx(slope, rel=1e-3)
 
 
@@ -78,9 +87,8 @@ def test_a_disc_that_was_weighed_is_on_the_page(blocks):
     assert "inboard [g]" not in page
 
 
-def test_blocks_in_mdf4_give_the_same_law(blocks):
+def test_blocks_in_mdf4_give_the_same_law(blocks, plain):
     mdf = pytest.importorskip("asammdf")
-    identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "csv.toml")
     with (blocks / "manifest.csv").open(newline="") as file:
         names = [row["file"] for row in csv.DictReader(file)]
     for name in names:
@@ -96,7 +104,7 @@ def test_blocks_in_mdf4_give_the_same_law(blocks):
         row.update(file=row["file"].replace(".csv", ".mf4")) for row in rows
     ])  # fmt: skip
     identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "mdf.toml")
-    laws = [load_config(blocks / f"{name}.toml").front.pad.coefficients for name in ("csv", "mdf")]
+    laws = [load_config(path).front.pad.coefficients for path in (plain, blocks / "mdf.toml")]
     assert laws[0] == pytest.approx(laws[1], rel=1e-6)
     (blocks / Path(names[0]).with_suffix(".mf4")).write_bytes(b"no MDF4")
     with pytest.raises(UserError, match=r"calm.mf4: cannot be read as MDF4"):
@@ -129,6 +137,14 @@ def rewrite(path: Path, change) -> None:
         writer.writerows(rows)
 
 
+def alter(path: Path, name: str, values) -> None:
+    """Replace a column of a block by what `values` makes of it."""
+    table = pa_csv.read_csv(path)
+    column = pa.array(values(table[name].to_numpy().astype(float)))
+    changed = table.set_column(table.column_names.index(name), name, column)
+    pa_csv.write_csv(changed, path, pa_csv.WriteOptions(quoting_style="none"))
+
+
 def few(folder: Path) -> None:
     path = folder / "town-calm.csv"
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:2000]))
@@ -147,15 +163,11 @@ def heavier(folder: Path) -> None:
 
 
 def fahrenheit(folder: Path) -> None:
-    rewrite(folder / "town-calm.csv", lambda rows: [
-        row.update(disc_temperature=f"{32 + 1.8 * float(row['disc_temperature']):.2f}") for row in rows
-    ])  # fmt: skip
+    alter(folder / "town-calm.csv", "disc_temperature", lambda degrees: 32.0 + 1.8 * degrees)
 
 
 def kelvin(folder: Path) -> None:
-    rewrite(folder / "town-calm.csv", lambda rows: [
-        row.update(disc_temperature=f"{273.15 + float(row['disc_temperature']):.2f}") for row in rows
-    ])  # fmt: skip
+    alter(folder / "town-calm.csv", "disc_temperature", lambda degrees: 273.15 + degrees)
 
 
 def alike(folder: Path) -> None:
@@ -178,12 +190,7 @@ def text(folder: Path) -> None:
 def scaled(column: str, factor: float):
     """Return what writes a column of one block in another unit."""
 
-    def spoil(folder: Path) -> None:
-        rewrite(folder / "town-calm.csv", lambda rows: [
-            row.update({column: f"{factor * float(row[column]):.9g}"}) for row in rows
-        ])  # fmt: skip
-
-    return spoil
+    return lambda folder: alter(folder / "town-calm.csv", column, lambda values: factor * values)
 
 
 def weighed(factor: float):
@@ -229,7 +236,11 @@ def mistyped_mass(folder: Path) -> None:
 
 
 def without_torque(folder: Path) -> None:
-    rewrite(folder / "town-calm.csv", lambda rows: [row.update(brake_torque="nan") for row in rows[40:140]])
+    def gap(torque):
+        torque[40:140] = np.nan
+        return torque
+
+    alter(folder / "town-calm.csv", "brake_torque", gap)
 
 
 def german(folder: Path) -> None:
@@ -247,45 +258,43 @@ def german(folder: Path) -> None:
 
 
 def slow_thermocouple(folder: Path) -> None:
-    def thin(rows):
-        for place, row in enumerate(rows):
-            row["disc_temperature"] = row["disc_temperature"] if place % 3 == 0 else ""
-
     for path in folder.glob("*-*.csv"):
-        rewrite(path, thin)
+        alter(path, "disc_temperature", lambda degrees: [
+            value if place % 3 == 0 else None for place, value in enumerate(degrees)
+        ])  # fmt: skip
 
 
 def mistyped_sample(folder: Path) -> None:
-    rewrite(folder / "town-calm.csv", lambda rows: rows[800].update(brake_torque="1e6"))
+    def mistype(torque):
+        torque[800] = 1e6
+        return torque
+
+    alter(folder / "town-calm.csv", "brake_torque", mistype)
 
 
 def anew(folder: Path) -> None:
-    def from_zero(rows):
-        begin = before = float(rows[0]["t"])
-        for row in rows:
-            t = float(row["t"])
-            begin = t if t - before > 1.0 else begin
-            before, row["t"] = t, f"{t - begin:.4f}"
+    def from_zero(t):
+        begins = np.concatenate([[True], np.diff(t) > 1.0])
+        return np.round(t - np.maximum.accumulate(np.where(begins, t, -np.inf)), 4)
 
-    rewrite(folder / "town-calm.csv", from_zero)
+    alter(folder / "town-calm.csv", "t", from_zero)
 
 
 @pytest.mark.parametrize("write", [german, slow_thermocouple, mistyped_sample, anew])
-def test_blocks_as_rigs_write_them_give_the_same_law(blocks, write, capsys):
-    identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "plain.toml")
+def test_blocks_as_rigs_write_them_give_the_same_law(blocks, plain, write, capsys):
     write(blocks)
     columns = blocks / "map.toml" if write is german else None
     capsys.readouterr()
     identify_wear(blocks / "manifest.csv", CONFIG, "front", blocks / "car.toml", columns)
-    laws = [load_config(blocks / f"{name}.toml").front.pad.coefficients for name in ("plain", "car")]
+    laws = [load_config(path).front.pad.coefficients for path in (plain, blocks / "car.toml")]
     assert laws[1] == pytest.approx(laws[0], rel=0.03, abs=1e-5)
     assert ("stands alone" in capsys.readouterr().err) == (write is mistyped_sample)
 
 
 BAD = {
     "a thermocouple beside the disc": (
-        lambda folder: rewrite(
-            folder / "town-calm.csv", lambda rows: [row.update(disc_temperature="25") for row in rows]
+        lambda folder: alter(
+            folder / "town-calm.csv", "disc_temperature", lambda degrees: np.full_like(degrees, 25.0)
         ),
         "disc_temperature: does not rise when the brake is applied",
     ),
