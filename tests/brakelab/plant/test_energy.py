@@ -18,7 +18,7 @@ from ecu.settings.config import load_config
 
 CONFIG = Path(__file__).parents[3] / "config"
 SCENARIOS = sorted(path.stem for path in (CONFIG / "scenarios").glob("*.toml"))
-LONGEST_SCENARIO = 120.0  # s of a scenario
+LONGEST_SCENARIO = 60.0  # s of a scenario
 G, MASS, BASE, FRONT, REAR, TRACK, HEIGHT = 9.81, 2105.0, 2.665, 1.29, 1.375, 1.625, 0.66
 DRAG, ROLLING, CARCASS = 0.5 * 1.2 * 0.35 * 2.32, 0.010, (4.0e5, 1.8e5)
 DAMPER_SPEED = [-1.0, -0.3, -0.1, 0.0, 0.1, 0.3, 1.0]
