@@ -29,6 +29,7 @@ ESTIMATE = np.dtype(
         ("mass", "f8"),  # kg
         ("accel_bias", "f8"),  # of the accelerometer [m/s^2]
         ("overrun", "f8"),  # unreported engine drag while braking, over mass [m/s^2]
+        ("overrun_power", "f8"),  # of that drag, over mass [W/kg], see `whole_filter.py`; NaN: likewise
         ("sigma_overrun", "f8"),  # m/s^2, of it and of a mean's noise; NaN: only learned where others brake
         ("grip_limit", "f8"),  # ceiling of the brakes' deceleration [m/s^2]; NaN: unknown
         ("sigma_grip_limit", "f8"),  # m/s^2
@@ -71,6 +72,7 @@ UNITS = {
     **dict.fromkeys(("speed", "lateral_speed"), "m/s"),
     **dict.fromkeys(("accel_x", "accel_x_model", "accel_y", "accel_bias", "overrun"), "m/s^2"),
     **dict.fromkeys(("sigma_overrun", "grip_limit", "sigma_grip_limit"), "m/s^2"),
+    "overrun_power": "W/kg",
     "yaw_rate": "rad/s",
     "steering": "rad",
     "mass": "kg",

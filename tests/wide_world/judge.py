@@ -27,6 +27,7 @@ import numpy as np
 
 from brakelab.api import Result, replay
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, Line, Panel, write_chart
+from brakelab.results.prediction import power_drag
 
 from .brakings import Braking, Signals, find, lining_decel, read, rest_decel
 from .config import Nominal
@@ -69,9 +70,9 @@ def published(result: Result, signals: Signals, brakings: list[Braking], nominal
         row = int(np.searchsorted(result["t"], signals.t[braking.start] + 1e-6)) - 2
         friction = four("mu_b", row)
         mu = np.where(np.isnan(friction), np.repeat(nominal.mu_nominal, 2), friction)
-        mass, zero, overrun, relative = (
+        mass, zero, overrun, power, relative = (
             float(np.nan_to_num(result[name][row]))
-            for name in ("vehicle_mass", "accel_x_zero", "overrun", "sigma_brake_force")
+            for name in ("vehicle_mass", "accel_x_zero", "overrun", "overrun_power", "sigma_brake_force")
         )
         mass = mass if mass > 0.0 else nominal.mass
         knee = result["grip_knee"][row]
@@ -83,6 +84,7 @@ def published(result: Result, signals: Signals, brakings: list[Braking], nominal
         lining = float(np.mean(each))
         known = signals._replace(motor=signals.motor * result["motor_torque_share"][row])
         rest = rest_decel(known, braking.rows, nominal, mass)
+        overrun += power * float(np.mean(power_drag(signals.speed[braking.rows])))
         decel.append(lining + rest + overrun - zero / (1.0 + G * nominal.pitch_gradient))
         if relative == 0.0:
             relative = float(np.mean(four("sigma_mu_b", row) / mu))

@@ -23,7 +23,8 @@ def result(**columns: float) -> dict[str, np.ndarray]:
         for corner in CORNERS
     }
     given |= {"grip_limit": np.nan, "grip_knee": np.nan, "motor_torque_share": 1.0}
-    given |= {"vehicle_mass": 1200.0, "accel_x_zero": 0.0, "overrun": 0.0, "sigma_brake_force": 0.1} | columns
+    given |= {"vehicle_mass": 1200.0, "accel_x_zero": 0.0, "sigma_brake_force": 0.1}
+    given |= {"overrun": 0.0, "overrun_power": 0.0} | columns
     later = np.where(np.arange(len(t)) >= 300, 2.0, 1.0)
     return {"t": t} | {name: value * later for name, value in given.items()}
 
@@ -33,6 +34,7 @@ def result(**columns: float) -> dict[str, np.ndarray]:
     [
         ({}, 1.0, 0.0),
         ({"overrun": 0.8}, 1.0, 0.8),
+        ({"overrun_power": 7.0}, 1.0, "power"),
         ({"accel_x_zero": 0.2}, 1.0, -0.2 / (1.0 + G * 0.002)),
         ({f"mu_b_{corner}": 0.3 for corner in CORNERS}, None, 0.0),
         ({"grip_limit": 2.9, "grip_knee": 2.5}, "bent", 0.0),
@@ -40,12 +42,14 @@ def result(**columns: float) -> dict[str, np.ndarray]:
     ],
 )
 def test_the_row_before_a_braking_predicts_it(
-    columns: dict[str, float], lining: float | str | None, more: float
+    columns: dict[str, float], lining: float | str | None, more: float | str
 ) -> None:
     known = read(signals(pulse()), NOMINAL)
     brakings = find(known, NOMINAL)
     said = published(result(**columns), known, brakings, NOMINAL)
     nominal = np.mean(brakings[0].lining)
+    if more == "power":
+        more = float(np.mean(7.0 / known.speed[brakings[0].rows])) - 0.5
     if lining == "bent":
         lining = (1.0 + (nominal / 2.9) ** 2.5) ** -0.4
     if lining is None:

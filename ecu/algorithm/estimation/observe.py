@@ -23,16 +23,16 @@ from ecu.algorithm.estimation.joint.prior import begin_application, end_applicat
 from ecu.algorithm.estimation.joint.sliding import suspend_learning
 from ecu.algorithm.estimation.joint.speed import doubt_speed
 from ecu.algorithm.estimation.joint.whole_application import (
+    add_coasting,
     add_to_whole,
     apply_scale,
     begin_whole,
     end_whole,
-    forget_whole,
-    keep_whole,
     restore_whole,
     tell_whole,
     torques_measured,
 )
+from ecu.algorithm.estimation.joint.whole_filter import forget_filter, keep_filter
 from ecu.algorithm.estimation.motion import tell_motion, update_motion
 from ecu.algorithm.estimation.thesis.estimates import tell_friction, tell_wheels
 from ecu.algorithm.estimation.thesis.force import reset_force, take_measured_force, update_force
@@ -83,7 +83,7 @@ def keep_application(p: Record, s: Record) -> None:
         if end_prediction(s.prediction):
             forget_levels(s.joint)
             close_book(s.prediction)
-            forget_whole(s.whole)
+            forget_filter(s.whole.filter)
     _keep(p, s)
 
 
@@ -91,7 +91,7 @@ def keep_application(p: Record, s: Record) -> None:
 def _keep(p: Record, s: Record) -> None:
     keep_joint(p, s.joint, s.learned)
     if not p.transmit:
-        keep_whole(s.whole, s.learned)
+        keep_filter(s.whole.filter, s.learned)
         apply_scale(p, s.whole, s.learned)
 
 
@@ -127,7 +127,7 @@ def observe(
     tell_motion(s.motion, e)
     for i in range(4):
         e.load[i], e.brake_torque[i] = s.wheel_load.load[i], s.friction.torque[i]
-    e.grip_limit = e.sigma_grip_limit = e.grip_knee = e.sigma_overrun = math.nan
+    e.grip_limit = e.sigma_grip_limit = e.grip_knee = e.sigma_overrun = e.overrun_power = math.nan
     e.torque_share, e.torques_known = 1.0, 1
     if p.observer == JOINT:
         _observe_jointly(p, s, u, heat, guarded, contradicted, braking, dt)
@@ -166,6 +166,7 @@ def _observe_jointly(
         follow_ceiling(p, joint, s.guard.capped, braking)
     if joint.closed and joint.released and not p.transmit:
         compare_drive(p, s.whole, joint)
+        add_coasting(p, s.whole, joint, u)
     if braking and joint.closed:
         if not p.transmit:
             add_to_whole(p, s.whole, joint)

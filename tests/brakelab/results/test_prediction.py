@@ -9,6 +9,7 @@ import pytest
 from brakelab.replay.engine import N_ROW
 from brakelab.results.brakes import BrakeBook, BrakeRow
 from brakelab.results.prediction import errors, one_scale, running_average
+from ecu.algorithm.estimation.joint.whole_filter import USUAL_SPEED
 from ecu.contract.params import BAR
 from ecu.contract.signals import FAULT, HOLDING, N_OUTPUTS, NOMINAL, OUTPUT
 from ecu.settings.config import load_config, new_params
@@ -91,6 +92,11 @@ def overrun(rows: np.ndarray) -> None:
     column(rows, "overrun")[:] = 0.25
 
 
+def power(rows: np.ndarray) -> None:
+    column(rows, "overrun_power")[:] = 5.0
+
+
+POWER = float(np.mean(5.0 / SPEEDS - 5.0 / USUAL_SPEED))
 MOTORS = float((150.0 / P["wheel_radius"]).sum() / INERT)
 REST = RESISTANCE + ROLLING
 
@@ -110,6 +116,7 @@ REST = RESISTANCE + ROLLING
         pytest.param(mass_unknown, linings() + REST, REST, id="mass not known: the configured one"),
         pytest.param(pressure_zero, linings(pressure=39.4) + REST, REST, id="pressure sensors 0.6 bar off"),
         pytest.param(overrun, linings() + REST + 0.25, REST + 0.25, id="overrun of a drive"),
+        pytest.param(power, linings() + REST + POWER, REST + POWER, id="a drive of constant power"),
     ],
 )
 def test_what_is_expected_of_a_braking(change: Change, force: float, rest: float) -> None:

@@ -3,7 +3,7 @@
 Without a friction sensor an estimate can only be judged by its prediction:
 
     f = [sum (2 A_i r_eff mu_i (p_i - z_i - p_0)+ + M_i) / r_i + drag v^2 + rolling g m]
-        / (m + sum I_i / r_i^2) + overrun
+        / (m + sum I_i / r_i^2) + overrun + overrun_power (1/v - 1/V)
 
 mu_i, mass m, overrun (unreported engine drag) and the pressure zeros z_i are those known before the
 application; pressures p_i, motor torques M_i (positive brakes) and the speed v are its own, I_i is a wheel's
@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.algorithm.estimation.friction import DRIVEN
+from ecu.algorithm.estimation.joint.whole_filter import FULL_TORQUE, USUAL_SPEED
 from ecu.contract.params import BAR, GRAVITY
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import N_OUTPUTS, OUTPUT
@@ -75,6 +76,11 @@ def mean(values: Vector, weights: Vector | None = None) -> float:
     return float(values[known] @ weights[known]) / total if total > 0.0 else float("nan")
 
 
+def power_drag(speed: Vector) -> Vector:
+    """Return the drag of a constant power at a speed [m/s], per W/kg, beyond that at `USUAL_SPEED`."""
+    return np.asarray(1.0 / np.maximum(speed, FULL_TORQUE) - 1.0 / USUAL_SPEED)
+
+
 def _motor_torques(rows: Vector) -> Vector:
     return np.nan_to_num(rows[:, N_OUTPUTS : N_OUTPUTS + 4])
 
@@ -115,6 +121,7 @@ class _Car(NamedTuple):
     mu_b: Vector
     mass: float
     overrun: float
+    power: float = 0.0  # of the unreported drag, over mass [W/kg]
     ceiling: float = float("inf")  # m/s^2, towards which the linings' deceleration bends
     knee: float = 1.0  # exponent of that bend
     motors: float = 1.0  # share of the reported torques that counts
@@ -129,7 +136,8 @@ def _forces(rows: Vector, before: Vector, car: _Car, params: RecordArray) -> tup
     resistance += p["rolling_resistance"] * GRAVITY * car.mass
     linings = _linings(rows, before, params) @ car.mu_b / inert
     linings = linings * (1.0 + (linings / car.ceiling) ** car.knee) ** (-1.0 / car.knee)
-    return linings, (motors + resistance) / inert + car.overrun
+    power = car.power * power_drag(rows[:, OUTPUT["vehicle_speed"]])
+    return linings, (motors + resistance) / inert + car.overrun + power
 
 
 def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
@@ -143,7 +151,8 @@ def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
     p = params[0]
     mass, overrun = float(before[OUTPUT["vehicle_mass"]]), float(np.nan_to_num(before[OUTPUT["overrun"]]))
     mass = mass if np.isfinite(mass) else float(p["mass"])
-    learned = _Car(corners(before, "mu_b"), mass, overrun)
+    power = float(np.nan_to_num(before[OUTPUT["overrun_power"]]))
+    learned = _Car(corners(before, "mu_b"), mass, overrun, power)
     if np.isfinite(before[OUTPUT["grip_knee"]]):
         ceiling, knee = float(before[OUTPUT["grip_limit"]]), float(before[OUTPUT["grip_knee"]])
         learned = learned._replace(ceiling=ceiling, knee=knee, motors=before[OUTPUT["motor_torque_share"]])

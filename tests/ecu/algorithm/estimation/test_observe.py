@@ -14,8 +14,9 @@ RATIOS = {"test_ratio", "test_ratio_balance", "test_ratio_speed"}
 GRIP = ("grip_limit", "sigma_grip_limit", "grip_knee")
 NOT_ESTIMATED = {
     JOINT: {"test_ratio_balance", "test_ratio_speed"},  # nothing brakes or drives, and there is no reference
-    OBSERVER1: {"sigma_force", "sigma_overrun", *GRIP, *RATIOS},  # only a filter of the whole car knows these
-    OBSERVER2: {"sigma_force", "sigma_overrun", *GRIP, *RATIOS},
+    # Only a filter of the whole car knows these.
+    OBSERVER1: {"sigma_force", "sigma_overrun", "overrun_power", *GRIP, *RATIOS},
+    OBSERVER2: {"sigma_force", "sigma_overrun", "overrun_power", *GRIP, *RATIOS},
 }
 
 

@@ -1,0 +1,165 @@
+"""The filter of whole applications: bend against differences, store, bounds, drag by its signatures."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ecu.algorithm.estimation.joint.whole_filter import (
+    CEILING,
+    COASTING_NOISE,
+    FILTER_STATE,
+    FULL_TORQUE,
+    GRIP,
+    HIGHEST_STATE,
+    KEPT,
+    LOWEST_STATE,
+    OVERRUN,
+    PAUSE,
+    PEDAL,
+    POWER,
+    PRIOR,
+    PRIOR_MEAN,
+    SCALE,
+    STATES,
+    USUAL_SPEED,
+    bend,
+    correct_by_coasting,
+    correct_by_mean,
+    forget_filter,
+    keep_filter,
+    per_power,
+    restore_filter,
+)
+from ecu.contract.records import LEARNED
+
+
+@pytest.fixture
+def state() -> Any:
+    """Return a filter that has learned nothing."""
+    new = np.zeros(1, FILTER_STATE)[0]
+    forget_filter(new)
+    return new
+
+
+def brake(state: Any, linings: float, decel: float, speed: float = USUAL_SPEED) -> None:
+    """Correct by an application of constant `linings` [m/s^2] at a constant speed."""
+    expected, by_scale, by_grip = bend(
+        math.exp(state["value"][SCALE]) * linings, CEILING * math.exp(state["value"][GRIP])
+    )
+    correct_by_mean(state, decel, expected, by_scale, by_grip, per_power(speed), True)
+
+
+@pytest.mark.parametrize("linings", [0.1, 3.0, 9.0, 14.0, 40.0])
+def test_derivatives_of_the_bend_are_those_of_differences(linings: float) -> None:
+    step, ceiling = 1e-6, 11.0
+    _, by_scale, by_grip = bend(linings, ceiling)
+    up, down = math.exp(step), math.exp(-step)
+    more, less = (bend(linings * by, ceiling)[0] for by in (up, down))
+    assert by_scale == pytest.approx((more - less) / (2 * step), rel=1e-5)
+    more, less = (bend(linings, ceiling * by)[0] for by in (up, down))
+    assert by_grip == pytest.approx((more - less) / (2 * step), rel=1e-5, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("case", "share", "expected", "within"),
+    [
+        ("gentle: the linings'", 0.05, 0.05, 0.001),
+        ("a tanh, next to it", 0.5, math.tanh(0.5), 0.05),
+        ("a tanh, next to it", 1.0, math.tanh(1.0), 0.05),
+        ("asked for far too much: the ceiling", 3.0, 1.0, 0.02),
+    ],
+)
+def test_brakes_give_what_linings_ask_up_to_the_ceiling(
+    case: str, share: float, expected: float, within: float
+) -> None:
+    assert bend(share * 10.0, 10.0)[0] == pytest.approx(10.0 * expected, rel=within)
+
+
+@pytest.mark.parametrize(
+    ("speed", "drag"),  # of 14 W/kg, beyond that at 14 m/s
+    [(3.0, 1.0), (FULL_TORQUE, 1.0), (USUAL_SPEED, 0.0), (28.0, -0.5)],
+)
+def test_a_constant_power_drags_less_the_faster_the_car(speed: float, drag: float) -> None:
+    assert 14.0 * per_power(speed) == pytest.approx(drag)
+
+
+def test_what_was_learned_comes_back_less_certain(state: Any) -> None:
+    """What belongs to a drive does not come back."""
+    learned = np.zeros(1, LEARNED)[0]
+    state["value"], state["covariance"] = [0.2, -0.3, 0.5, 0.3, 2.0], 0.001 * (np.eye(STATES) + 0.2)
+    keep_filter(state, learned)
+    again = np.zeros(1, FILTER_STATE)[0]
+    restore_filter(again, learned)
+    assert (again["value"] == [0.2, -0.3, 0.5, *PRIOR_MEAN[KEPT:]]).all()
+    before = state["covariance"][:KEPT, :KEPT]
+    wider = np.minimum(np.diag(before) + PAUSE**2, PRIOR[:KEPT] ** 2)
+    expected = np.diag(PRIOR**2)
+    expected[:KEPT, :KEPT] = before + np.diag(wider - np.diag(before))
+    assert again["covariance"] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("case", "linings", "decel", "reported"),
+    [
+        ("as configured", 4.0, 4.2, False),
+        ("an engine that drags by 0.8", 4.0, 4.8, False),
+        ("hardly any friction", 8.0, 1.0, True),
+        ("a road of ice: the ceiling is no fault", 20.0, 2.5, False),
+        ("a car that a pump brakes by 4 m/s^2", 0.9, 5.0, True),
+    ],
+)
+def test_a_value_that_no_car_has_is_reported_until_the_next_application(
+    state: Any, case: str, linings: float, decel: float, reported: bool
+) -> None:
+    if linings > CEILING:  # the linings are known before it
+        for light in (2.0, 3.0, 4.0) * 4:
+            brake(state, light, light + 0.2)
+    for _ in range(12):
+        brake(state, linings, decel)
+    assert bool(state["at_bound"]) == reported
+    assert (state["value"] >= LOWEST_STATE).all()
+    assert (state["value"] <= HIGHEST_STATE).all()
+    x = state["value"]
+    brake(state, 4.0, bend(4.0 * math.exp(x[SCALE]), CEILING * math.exp(x[GRIP]))[0] + x[OVERRUN])
+    assert not state["at_bound"]
+
+
+@pytest.mark.parametrize(
+    ("case", "coasting", "braking", "overrun", "pedal"),
+    [  # drag before and during applications [m/s^2]; o and d then
+        ("an engine", 0.8, 0.8, 0.8, 0.0),
+        ("motors that the brake pedal brings", 0.1, 1.3, 1.3, 1.2),
+        ("one pedal", 1.8, 1.8, 1.8, 0.0),
+        ("a clutch that opens while braking: between", 0.8, 0.3, 0.6, 0.0),
+    ],
+)
+def test_coasting_and_braking_tell_whose_drag_it_is(
+    state: Any, case: str, coasting: float, braking: float, overrun: float, pedal: float
+) -> None:
+    for linings in (1.0, 4.0, 2.0, 5.0) * 5:
+        for _ in range(20):
+            correct_by_coasting(state, coasting, USUAL_SPEED, 0.05)
+        brake(state, linings, linings + braking)
+    assert state["value"][OVERRUN] == pytest.approx(overrun, abs=0.25)
+    assert state["value"][PEDAL] == pytest.approx(pedal, abs=0.25)
+
+
+def test_the_drag_of_the_first_application_is_known_before_it(state: Any) -> None:
+    """A second of coasting leaves its own noise, and what the brake pedal may bring."""
+    for _ in range(20):
+        correct_by_coasting(state, 1.8, USUAL_SPEED, 0.05)
+    assert state["value"][OVERRUN] == pytest.approx(1.8, abs=0.4)
+    shown = np.array([0.0, 0.0, 1.0, -1.0, 0.0])
+    assert shown @ state["covariance"] @ shown < 1.3 * COASTING_NOISE**2
+
+
+def test_the_speed_separates_power_from_drag(state: Any) -> None:
+    """An engine that gears keep at its speed, 6 W/kg; applications of 2 m/s^2 at 9 to 30 m/s."""
+    for speed in (28.0, 9.0, 20.0, 12.0, 30.0, 15.0) * 10:
+        brake(state, 2.0, 2.0 + 6.0 / speed, speed)
+    for speed in (9.0, 14.0, 28.0):
+        said = 2.0 * math.exp(state["value"][SCALE]) - 2.0
+        said += state["value"][OVERRUN] + state["value"][POWER] * per_power(speed)
+        assert said == pytest.approx(6.0 / speed, abs=0.1), speed
