@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from structlog.testing import capture_logs
 
+from ecu.algorithm.estimation.joint.whole_filter import HIGHEST_STATE, KEPT, LOWEST_STATE
 from ecu.contract.records import DUST, LEARNED, N_KEPT, N_MEASURED, WEAR, new_record
 from ecu.errors import UserError
 from ecu.recording import revisions
@@ -219,6 +220,7 @@ OUT_OF_RANGE = {
     "radius is no number": {"radius_error": np.nan},
     "negative time": {"observed_s": -1.0},
     "negative count": {"brakings": -1},
+    "drag that no car has": {"whole": [[0.0, 0.0, 2.6]]},
     "negative variance": {"joint_covariance": triangle(NEGATIVE)},
     "correlation above one": {"joint_covariance": triangle(TIED_TOO_MUCH)},
     "covariance is no number": {"joint_covariance": triangle(NOT_FINITE)},
@@ -233,6 +235,13 @@ def test_a_value_that_cannot_be_falls_back_to_the_revision_before(tmp_path, wron
     save(store, KEY, learned(**{"brakings": 8, **wrong}))
     revision, found = restore(store, KEY, NOMINAL)
     assert (revision, found["brakings"][0]) == (1, 7)
+
+
+@pytest.mark.parametrize("bound", [LOWEST_STATE[:KEPT], HIGHEST_STATE[:KEPT]])
+def test_what_whole_applications_have_learned_comes_back_at_its_bounds(tmp_path, bound):
+    store = open_store(tmp_path)
+    save(store, KEY, learned(whole=bound))
+    assert restore(store, KEY, NOMINAL) is not None
 
 
 def test_a_corner_that_was_never_observed_needs_no_friction(tmp_path):
