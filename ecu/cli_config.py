@@ -1,9 +1,10 @@
 """`brake-ecu config …`: writes, checks and describes CONFIG files."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from ecu.arguments import Commands, argument, config_file, flag, option
+from ecu.arguments import Commands, State, argument, config_file, flag, option
 
 app = Commands(help="Write, check and describe configurations.", no_args_is_help=True)
 
@@ -12,11 +13,13 @@ app = Commands(help="Write, check and describe configurations.", no_args_is_help
 def check(
     file: Annotated[Path, argument("CONFIG", "Vehicle and tuning: file or name", parser=config_file)],
     picture: Annotated[bool, flag("--picture", "Draw the distribution beside what Annex 5 forbids")] = False,
+    state: State = None,
 ) -> int:
     """List every mistake of a configuration, or what its car comes to."""
+    from ecu.recording.restored import restored
     from ecu.settings import check
 
-    return check.check(file, picture)
+    return check.check(file, picture, partial(restored, state) if state else None)
 
 
 @app.command()

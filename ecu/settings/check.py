@@ -5,13 +5,16 @@ one, how hard the whole pedal brakes, how much of it a road holds, how far the c
 forbids. Swapped numbers that are possible show there.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from ecu.algorithm.control.distribution import front_share
+from ecu.algorithm.estimation.joint.whole_filter import CEILING, GRIP
 from ecu.contract.params import BAR, GRAVITY
+from ecu.contract.records import RecordArray
 from ecu.output import fault, give
 from ecu.settings.annex3 import LEAST_DECEL, full_braking
 from ecu.settings.annex5 import DEMANDED, K_RULED, Z_ORDERED, Load, shares, utilisation
@@ -22,11 +25,14 @@ RATES: Final = (0.2, 0.4, 0.6, 0.8)  # braking rates z
 ROADS: Final = (0.2, 0.4, 0.6, 0.8)
 """Adhesion from snow to a dry road."""
 
+Kept = Callable[[Config, RecordArray], tuple[int, RecordArray] | None]
+"""Revision and `LEARNED` that a store holds of a car and its `PARAMS`."""
 
-def check(path: Path, pictured: bool = False) -> int:
+
+def check(path: Path, pictured: bool = False, kept: Kept | None = None) -> int:
     """Print each mistake of a CONFIG file in a line and return 2; or the figures of its car, and 0.
 
-    `pictured` adds the distribution beside what Annex 5 forbids.
+    `pictured` adds the distribution beside what Annex 5 forbids, `kept` the ceiling of grip that was learned.
 
     Raises UserError for a file that is no TOML.
     """
@@ -36,10 +42,13 @@ def check(path: Path, pictured: bool = False) -> int:
             fault(f"brake-ecu: {finding}")
         give(config=path, mistakes=[str(finding) for finding in config])
         return 2
-    params = new_params(config)[0]
+    record = new_params(config)
+    params = record[0]
     found = violations(path, config, params)
     for line in figures(config, params):
         print(line)
+    if kept:
+        print(learned_grip(params, kept(config, record)))
     give(config=path, mistakes=[str(one) for one in found], figures=figures_of(config, params))
     if pictured:
         print("\n".join(picture(params, config.vehicle.loads())))
@@ -115,6 +124,21 @@ def grip(params: Any, load: Load) -> str:
     return (
         f"grip          {load.name}: roads of {roads} hold a demand of {demands} m/s^2, {travels} % of the "
         f"pedal; all of it, {most:.1f} m/s^2, needs {needs:.2f}"
+    )
+
+
+def learned_grip(params: Any, found: tuple[int, RecordArray] | None) -> str:
+    """Return how much of the pedal the ceiling of grip holds that whole applications have taught."""
+    place = GRIP * (GRIP + 3) // 2  # of its variance, lower triangle by rows
+    variance = float(found[1]["whole_covariance"][0, place]) if found else 0.0
+    if found is None or variance == 0.0:
+        return "grip          no ceiling learned: only a car that others brake keeps one"
+    ceiling = CEILING * float(np.exp(found[1]["whole"][0, GRIP]))
+    most = float(params["pedal_decel"][-1])
+    travel = float(np.interp(ceiling, params["pedal_decel"], params["pedal_position"]))
+    return (
+        f"grip          learned: the linings brake by at most {ceiling:.1f} +- {ceiling * variance**0.5:.1f} "
+        f"m/s^2, {travel:.0f} % of the pedal; all of it asks for {most:.1f}"
     )
 
 

@@ -1,6 +1,8 @@
 """`config check`: all mistakes of a file at once, and a car's figures by balances of force and moment."""
 
+import math
 import re
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +10,11 @@ import pytest
 
 from ecu import cli
 from ecu.algorithm.control.distribution import front_share
+from ecu.algorithm.estimation.joint.whole_filter import CEILING, GRIP
+from ecu.algorithm.step import new_state
+from ecu.recording.store import open_store, save
 from ecu.settings.check import axle_torque_per_bar, figures, grip, held_demand, pressures
-from ecu.settings.config import load_config, new_params
+from ecu.settings.config import load_config, new_params, store_key
 
 CONFIGS = Path(__file__).parents[3] / "config"
 SUV = (CONFIGS / "suv.toml").read_text(encoding="utf-8")
@@ -112,6 +117,27 @@ def test_the_whole_pedal_is_reported_with_the_adhesion_that_it_needs() -> None:
     said = grip(new_params(config)[0], config.vehicle.loads()[0])
     assert said.endswith("all of it, 10.0 m/s^2, needs 1.02")
     assert "unladen: roads of 0.2, 0.4, 0.6, 0.8 hold a demand of 2.0, 3.9, 5.9, 7.8 m/s^2" in said
+
+
+@pytest.mark.parametrize(
+    ("case", "variance", "said"),
+    [
+        ("learned", 0.01, "learned: the linings brake by at most 7.0 +- 0.7 m/s^2, 82 % of the pedal;"),
+        ("of another car: none", 0.0, "no ceiling learned"),
+    ],
+)
+def test_a_learned_ceiling_is_compared_with_the_pedal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], case: str, variance: float, said: str
+) -> None:
+    """suv: 80 % of the pedal asks for 6.6 m/s^2, 100 % for 10."""
+    config = load_config(CONFIGS / "suv.toml")
+    learned = new_state(new_params(config))["learned"].copy()
+    learned["whole"][0, GRIP] = math.log(7.0 / CEILING)
+    learned["whole_covariance"][0] = np.diag([0.01, variance, 0.01])[np.tril_indices(3)]
+    with closing(open_store(tmp_path)) as store:
+        save(store, store_key(config), learned)
+    assert cli.main(["config", "check", str(CONFIGS / "suv.toml"), "--state", str(tmp_path)]) == 0
+    assert f"grip          {said}" in capsys.readouterr().out
 
 
 def test_pistons_counted_on_both_sides_show_as_twice_the_torque(tmp_path: Path) -> None:
