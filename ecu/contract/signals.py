@@ -181,7 +181,7 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("pressure_lateness_rise", "s", False, "", "of pressures behind their demands, as learned"),
     OutputSignal("pressure_lateness_fall", "s", False, "", "likewise, of falling ones"),
     OutputSignal("sigma_overrun", "m/s^2", False, "", "its standard deviation, with the noise of a mean"),
-    OutputSignal("overrun_power", "W/kg", False, "", "drag of constant power beyond that at 14 m/s"),
+    OutputSignal("overrun_power", "W/kg", False, "", "drag of constant power beyond that at 10 m/s"),
 )
 
 DEMANDS: Final = {

@@ -49,7 +49,7 @@ def test_the_row_before_a_braking_predicts_it(
     said = published(result(**columns), known, brakings, NOMINAL)
     nominal = np.mean(brakings[0].lining)
     if more == "power":
-        more = float(np.mean(7.0 / known.speed[brakings[0].rows])) - 0.5
+        more = float(np.mean(7.0 / known.speed[brakings[0].rows])) - 0.7
     if lining == "bent":
         lining = (1.0 + (nominal / 2.9) ** 2.5) ** -0.4
     if lining is None:

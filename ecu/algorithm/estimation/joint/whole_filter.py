@@ -27,12 +27,12 @@ SCALE, GRIP, OVERRUN, PEDAL, POWER = range(5)
 STATES = 5
 KEPT = 3  # of them: the others belong to a drive
 CEILING = 14.0  # m/s^2: a first braking at 12 must be possible before any was seen
-FULL_TORQUE, USUAL_SPEED = 7.0, 14.0  # m/s, below which power falls with speed; V
+FULL_TORQUE, USUAL_SPEED = 7.0, 10.0  # m/s, below which power falls with speed; V
 PRIOR_MEAN = np.array([0.0, 0.0, 0.2, 0.0, 0.0])  # the drags in m/s^2, the power in W/kg
-PRIOR = np.array([0.25, 0.5, 0.5, 0.5, 4.0])  # standard deviations: an engine drags by 0.1 to 1 m/s^2
-STEP = np.array([0.04, 0.03, 0.05, 0.1, 0.14])  # between applications, of a car with the usual noise
+PRIOR = np.array([0.25, 0.5, 0.5, 0.5, 3.0])  # standard deviations: an engine drags by 0.1 to 1 m/s^2
+STEP = np.array([0.04, 0.03, 0.05, 0.1, 0.1])  # between applications, of a car with the usual noise
 # Priors of scale, drag [m/s^2] and power [W/kg] beside windows, which teach nearly all; their step.
-BESIDE, BESIDE_DRAG, BESIDE_POWER, BESIDE_STEP = 0.03, 0.05, 0.7, 0.006
+BESIDE, BESIDE_DRAG, BESIDE_POWER, BESIDE_STEP = 0.03, 0.05, 0.5, 0.006
 PAUSE = np.array([0.03, 0.15, 0.1])  # of unknown length: rain, another road, another day
 LOWEST_STATE = np.array([-0.7, math.log(3.0 / CEILING), -1.0, 0.0, -20.0])
 # Motors with the accelerator released brake by 2.5 m/s^2, blended ones take 30 kW of a car of 1.5 t.
