@@ -55,8 +55,9 @@ PRIOR[OFFSET : OFFSET + 2] = 0.3
 PRIOR[DELAY] = 0.005
 PRIOR[SIDE], PRIOR[PEAK_LOAD] = 0.02, 0.08
 
-# Standard deviations of friction's prior, of its logarithm: all four together, per axle, per wheel.
-LEVEL_COMMON, LEVEL_AXLE, LEVEL_WHEEL = 0.13, 0.17, 0.04
+# Standard deviations of friction's prior, of its logarithm: all four together, per axle, per wheel. UN R90
+# lets a replacement lining brake by 15 % more or less than the original.
+LEVEL_COMMON, LEVEL_AXLE, LEVEL_WHEEL = 0.13, 0.15, 0.04
 # Difference between the levels of successive applications; linings that are driven in rise by 5 % in one.
 STEP_COMMON, STEP_AXLE, STEP_WHEEL = 0.05, 0.02, 0.005
 # Deviation of friction from its level within an application, and time constant of its return.

@@ -28,7 +28,7 @@ from ecu.algorithm.estimation.joint.prior import SCALE_ONLY, UNKNOWN_PER_ERROR
 from ecu.algorithm.vehicle import rolling_radius
 from ecu.jit import Record, kernel
 
-SHAPE = 1.6  # c of the Magic Formula
+SHAPE = 1.65  # c of the Magic Formula along the wheel (Bakker, Nyborg, Pacejka 1987, SAE 870421)
 NOMINAL_PEAK = 0.9  # adhesion
 PEAK_DEGRESSION = 0.05  # adhesion falls a little with load (Figure A.6)
 LEAST_OF_PEAK = 0.2  # of 1 - 4 y: a peak 1.5 times the usual
