@@ -245,6 +245,16 @@ def test_a_car_that_coasts_shows_its_drag(
     assert (found["covariance"][OVERRUN, OVERRUN] < PRIOR[OVERRUN] ** 2) == learns
 
 
+def test_coasting_begins_anew_after_the_accelerator(bystander: Bystander) -> None:
+    inputs = np.zeros(1, INPUTS)[0]
+    inputs["verdict"][ACCELERATOR_POSITION] = USABLE
+    for k in range(round(2.0 * COASTS_FROM_S / WINDOW_S)):
+        inputs["value"][ACCELERATOR_POSITION] = 10.0 if k % 6 == 5 else 0.0
+        bystander.window(0.0, 0.8 + bystander.rest(0.8))
+        add_coasting(bystander.params, bystander.state, bystander.joint, inputs)
+    assert (bystander.state["filter"]["value"] == PRIOR_MEAN).all()
+
+
 def test_a_car_that_coasts_for_long_shows_no_more_of_its_drag(bystander: Bystander) -> None:
     """The brake pedal may bring motors before it brings pressure."""
     inputs = np.zeros(1, INPUTS)[0]
