@@ -5,12 +5,15 @@
 
 of the blocks of 0.1 s that `acceleration.py` gathers. Each is a Kalman filter of two states: a slope does not
 come and go with the force. Errors of mass, motors, drag and pitch are in them from the start, so what counts
-is what they have moved by from their means, which stand still meanwhile.
+is what they have moved by from what is usual. That of the torques is a slow filter of the same blocks, which
+learns none that has moved by half of the tolerance; it is as uncertain as the present force is unlike those
+seen. That of the wheels is a mean, which stands still meanwhile.
 
-A zero moves b and c alike, a scale k and s: what has moved in both is taken off the reading. A c without b is
-a slope; a b without c is no zero of the accelerometer (`motors.py`), an s without k none of its scale. What
-both lines have moved by, where the car is now, tells the accelerometer's name before zero and scale can be
-separated. Who gets in at a standstill changes b and k: then they are learned anew.
+A zero moves b and c alike, a scale k and s: what has moved in both is taken off the reading, once the forces
+seen tell a zero from a scale. A c without b is a slope; a b without c is no zero of the accelerometer
+(`motors.py`), an s without k none of its scale. What both lines have moved by, where the car is now, tells
+the accelerometer's name before that; it is left out until then. Who gets in at a standstill changes b and k:
+then they are learned anew.
 
 A reading that is off by more than `GROSS` at once is not followed: it is implausible as a whole.
 
@@ -33,6 +36,7 @@ from ecu.algorithm.monitoring.error_line import (
     learn_scale,
     moved_offset,
     moved_scale,
+    sigma_line,
     widen_line,
 )
 from ecu.algorithm.monitoring.witness import compare
@@ -69,15 +73,18 @@ ACROSS = 2.0  # m/s^2, above which tyres drag by more than 0.03
 SLOPE_WALK, SCALE_WALK = 0.1, 0.01  # m/s^2 and - per root second
 ZERO_WALK, TORQUE_WALK = 0.03, 0.003  # likewise, of b and k
 NOISE, TORQUE_NOISE = 0.15, 0.1  # m/s^2, of a block's difference
+USUAL_WALK, USUAL_SCALE_WALK = 0.001, 0.0005  # as above, of the usual line: it follows within minutes
+USUAL_NOISE = 0.15  # m/s^2: errors of its blocks last for some
 SLIP, SLIP_BY_SPEED = 0.1, 0.01  # of a change of force, -, s/m
 STEADY = 1.0  # m/s^2 in 0.2 s, beyond which tyre forces still build up
 GROSS = 1.5  # m/s^2
-SLOPE_S, SCALE_S, TORQUES_S = 10.0, 30.0, 60.0  # memory of c, s, b and k
+SLOPE_S, SCALE_S = 10.0, 30.0  # memory of the usual c and s
 FEWEST_S, FEWEST_SCALE_S, FEWEST_REPORTED_S = 2.0, 3.0, 5.0
 APART_S = 0.5
 KNOWN_OFFSET = 0.06  # m/s^2, standard deviation: forces of one size do not tell a zero from a scale
 UNSEEN, UNSEEN_SHARE, WIND = 0.1, 0.03, 0.25  # m/s^2, of the force, of the drag: what torques may differ by
-MOVED, REPORTED_S = 0.14, 0.4  # m/s^2, sound cars stay below 0.07; s
+MOVED, REPORTED_S = 0.1, 0.4  # m/s^2, s
+SIGMAS = 2.0  # of the usual line
 ROLLS, ROLLS_S, ROLLS_TIMES = 0.05, 1.0, 3  # of the speed; s; -
 ROLLS_FREE = 1.0  # m/s^2
 UNMOVED = 0.4  # of that, what the torques show of it
@@ -94,33 +101,28 @@ CHANGED = 1.0  # m/s^2, of the wheels' deceleration meanwhile
 
 
 @kernel
-def _off(value: float, doubt: float, off: float) -> float:
-    """Return what to take off: an error beyond its doubt, until it is below `KEPT` of it.
-
-    `off`: taken off until now.
-    """
-    least = doubt if off == 0.0 else KEPT * doubt
-    return value if abs(value) > least else 0.0
-
-
-@kernel
 def accel_doubted(state: Record) -> bool:
     """Return whether zero or scale of the accelerometer are known to have drifted."""
     return state.reported != 0 or state.zero_off != 0.0 or state.scale_off != 0.0
 
 
 @kernel
+def accel_unknown(state: Record) -> bool:
+    """Return whether the accelerometer errs, and it is not known whether its zero or its scale does."""
+    return state.reported != 0 and state.zero_off == 0.0 and state.scale_off == 0.0
+
+
+@kernel
 def _wheels_accel(mean: Record) -> float:
     """Return dw/dt over the last blocks [m/s^2]."""
-    accel: float = (mean[0, W] - mean[3, W]) / (3.0 * BLOCK_S)
-    return accel
+    return float((mean[0, W] - mean[3, W]) / (3.0 * BLOCK_S))
 
 
 @kernel
 def _follow_wheels(state: Record, mean: Record) -> None:
     """Correct c and s by the last block."""
     line = state.wheels
-    widen_line(line, SLOPE_WALK, SCALE_WALK)
+    widen_line(line.now, SLOPE_WALK, SCALE_WALK)
     change = abs(mean[0, F] - mean[2, F])
     h = _wheels_accel(mean)
     if abs(h) < LEAST_SHOWN:
@@ -128,10 +130,12 @@ def _follow_wheels(state: Record, mean: Record) -> None:
     elif not (accel_doubted(state) or state.rolls_wrong):
         learn_scale(line, SCALE_S)
     rolled = (mean[0, W] - mean[1, W]) / BLOCK_S
-    innovation = 0.5 * (mean[0, A] + mean[1, A]) - rolled - line.offset - line.scale * h
+    innovation = 0.5 * (mean[0, A] + mean[1, A]) - rolled - line.now.offset - line.now.scale * h
     if change > STEADY or abs(innovation) > GROSS:
         return
-    correct_line(line, h, innovation, NOISE + (SLIP + SLIP_BY_SPEED * mean[0, W]) * change / (2.0 * BLOCK_S))
+    correct_line(
+        line.now, h, innovation, NOISE + (SLIP + SLIP_BY_SPEED * mean[0, W]) * change / (2.0 * BLOCK_S)
+    )
 
 
 @kernel
@@ -140,22 +144,39 @@ def wheels_confirm(state: Record, mean: Record, moved: float) -> bool:
     h, beside = _wheels_accel(mean), moved_offset(state.wheels)
     if abs(h) > LEAST_SHOWN:
         beside += moved_scale(state.wheels) * h
-    confirm: bool = beside * moved > CONFIRMED * moved * moved
-    return confirm
+    return bool(beside * moved > CONFIRMED * moved * moved)
 
 
 @kernel
-def torques_tolerance(params: Record, mean: Record) -> float:
+def _unsure(state: Record, mean: Record) -> float:
+    """Return by how much more the torques may differ from their usual line at a force unlike those seen."""
+    return SIGMAS * sigma_line(state.torques.usual, mean[0, F])
+
+
+@kernel
+def torques_tolerance(params: Record, state: Record, mean: Record) -> float:
     """Return what the torques' deceleration may differ from its usual one by [m/s^2]."""
     drag: float = params.drag_area * mean[0, W] * mean[0, W] / params.mass
-    return UNSEEN + UNSEEN_SHARE * abs(mean[0, F]) + WIND * drag
+    return UNSEEN + UNSEEN_SHARE * abs(mean[0, F]) + WIND * drag + _unsure(state, mean)
+
+
+@kernel
+def _torques_moved(state: Record, mean: Record) -> float:
+    """Return what the torques' line has moved by at the present force [m/s^2]."""
+    return moved_offset(state.torques) + moved_scale(state.torques) * mean[0, F]
 
 
 @kernel
 def usual_known(state: Record) -> bool:
     """Return whether it is known what reading and torques usually differ by."""
-    known: bool = state.torques.offset_s > FEWEST_REPORTED_S
-    return known
+    return bool(state.torques.offset_s > FEWEST_REPORTED_S)
+
+
+@kernel
+def _zero_known(state: Record) -> bool:
+    """Return whether the forces seen tell a zero from a scale."""
+    torques = state.torques
+    return bool(torques.offset_s > FEWEST_S and torques.usual.p[0] < KNOWN_OFFSET**2)
 
 
 @kernel
@@ -200,26 +221,24 @@ def all_wheels_scaled(state: Record, over_ground: float, accel: float) -> bool:
     moved = moved_scale(state.wheels)
     if abs(accel) < ROLLS_FREE:
         state.rolls_confirmed = 1 if over_ground * moved > CONFIRMED * moved * moved else 0
-    again: bool = state.rolls_times >= ROLLS_TIMES
-    return again if math.isnan(over_ground) else state.rolls_confirmed != 0
+    again = state.rolls_times >= ROLLS_TIMES
+    return bool(again if math.isnan(over_ground) else state.rolls_confirmed != 0)
 
 
 @kernel
 def _compare_lines(state: Record, mean: Record, witness: Record) -> None:
     """Overwrite `reported`: both lines have moved to the same side at the present force and deceleration."""
-    torques = state.torques
     if not usual_known(state):
         return
-    moved = moved_offset(torques) + moved_scale(torques) * mean[0, F]
+    moved, doubt = _torques_moved(state, mean), MOVED + _unsure(state, mean)
     agree = wheels_confirm(state, mean, moved) and state.rolls_wrong == 0
     if agree:
-        compare(witness, ACCEL_X, moved, MOVED)
-    stands = abs(moved) > (KEPT if state.reported else 1.0) * MOVED
+        compare(witness, ACCEL_X, moved, doubt)
+    stands = abs(moved) > (KEPT if state.reported else 1.0) * doubt
     change = BLOCK_S if stands and (agree or state.reported != 0) else -BLOCK_S
     state.doubted_s = min(max(state.doubted_s + change, 0.0), REPORTED_S)
-    state.reported = (
-        1 if state.doubted_s > REPORTED_S - 0.5 * BLOCK_S or (state.reported and state.doubted_s > 0.0) else 0
-    )
+    lasts = state.doubted_s > (0.0 if state.reported else REPORTED_S - 0.5 * BLOCK_S)
+    state.reported = 1 if lasts else 0
 
 
 @kernel
@@ -234,30 +253,30 @@ def _follow_torques(params: Record, state: Record, mean: Record, witness: Record
             state.proven_s = min(state.proven_s + BLOCK_S, SURE_S)
         elif left - max(moved_offset(state.wheels), 0.0) > engine:
             state.proven_s = max(state.proven_s - REFUTES * BLOCK_S, 0.0)
-    apart = left - line.usual_offset - line.usual_scale * force if usual_known(state) else 0.0
-    state.apart += (apart - state.apart) * BLOCK_S / APART_S
-    innovation = left - line.offset - line.scale * force
+    beside = left - line.usual.offset - line.usual.scale * force
+    state.apart += ((beside if usual_known(state) else 0.0) - state.apart) * BLOCK_S / APART_S
+    innovation = left - line.now.offset - line.now.scale * force
     if abs(innovation) > GROSS or state.proven_s < PROVEN_S:
         return
-    widen_line(line, ZERO_WALK, TORQUE_WALK)
-    correct_line(line, force, innovation, TORQUE_NOISE)
+    widen_line(line.now, ZERO_WALK, TORQUE_WALK)
+    correct_line(line.now, force, innovation, TORQUE_NOISE)
     _compare_scales(params, state, mean, witness)
     _compare_lines(state, mean, witness)
-    usual = abs(state.apart) < USUAL * torques_tolerance(params, mean)
-    if line.p[0] > KNOWN_OFFSET**2:
-        if line.offset_s == 0.0:
-            line.usual_offset, line.usual_scale = line.offset, line.scale
-    elif usual and state.zero_off == 0.0 and state.reported == 0:
-        learn_offset(line, TORQUES_S)
-        learn_scale(line, TORQUES_S)
+    usual = abs(state.apart) < USUAL * torques_tolerance(params, state, mean)
+    usual = usual and abs(_torques_moved(state, mean)) < USUAL * (MOVED + _unsure(state, mean))
+    if usual and state.zero_off == 0.0 and state.reported == 0:
+        widen_line(line.usual, USUAL_WALK, USUAL_SCALE_WALK)
+        correct_line(line.usual, force, beside, USUAL_NOISE)
+        line.offset_s += BLOCK_S
         if abs(moved_offset(line)) < 0.5 * ZERO_DOUBT:
             learn_offset(state.wheels, SLOPE_S)
     zero = moved_offset(line)
-    confirmed = line.offset_s > FEWEST_S and moved_offset(state.wheels) * zero > CONFIRMED * zero * zero
+    confirmed = _zero_known(state) and moved_offset(state.wheels) * zero > CONFIRMED * zero * zero
     confirmed = confirmed and state.rolls_wrong == 0
     if confirmed:
         compare(witness, ACCEL_X, zero, ZERO_DOUBT)
-    state.zero_off = _off(zero, ZERO_DOUBT, state.zero_off) if confirmed else 0.0
+    doubt = ZERO_DOUBT if state.zero_off == 0.0 else KEPT * ZERO_DOUBT
+    state.zero_off = zero if confirmed and abs(zero) > doubt else 0.0
 
 
 @kernel
@@ -275,17 +294,18 @@ def follow_accel_error(
         braking: a brake application lasts.
     """
     wheels, torques = state.wheels, state.torques
-    if wheels.p[0] == 0.0:
-        wheels.p[0], wheels.p[1] = OFFSET_START**2, SCALE_START**2
-        torques.p[0], torques.p[1] = OFFSET_START**2, SCALE_MOST**2
+    if wheels.now.p[0] == 0.0:
+        wheels.now.p[0], wheels.now.p[1] = OFFSET_START**2, SCALE_START**2
+        torques.now.p[0], torques.now.p[1] = OFFSET_START**2, SCALE_MOST**2
+        torques.usual.p[:] = torques.now.p
     stands = abs(blocks.mean[0, ROLLED]) < STANDS
     state.stood_s = state.stood_s + BLOCK_S if stands else 0.0
     doubted = accel_doubted(state)
     for i in range(MOTOR_TORQUE, MOTOR_TORQUE + 4):
         doubted = doubted or witness.rejected[i] != 0
     if state.stood_s > STOOD_S and not doubted:
-        torques.offset_s = torques.scale_s = 0.0
-        torques.p[1] = SCALE_MOST**2
+        torques.offset_s, torques.now.p[1] = 0.0, SCALE_MOST**2
+        torques.usual.p[0], torques.usual.p[1], torques.usual.p[2] = OFFSET_START**2, SCALE_MOST**2, 0.0
     if blocks.good_blocks > 3:
         _follow_wheels(state, blocks.mean)
     if blocks.known_blocks > 1 and not braking and abs(across) < ACROSS:
@@ -296,7 +316,7 @@ def follow_accel_error(
     shown = by_wheels if abs(by_wheels) < abs(by_torques) else by_torques
     if by_wheels * by_torques <= 0.0:
         shown = 0.0
-    if wheels.scale_s > FEWEST_SCALE_S and torques.scale_s > FEWEST_S:
+    if wheels.scale_s > FEWEST_SCALE_S and _zero_known(state):
         compare(witness, ACCEL_X, shown * LEAST_SHOWN, SCALE_DOUBT * LEAST_SHOWN)
         still = state.scale_off != 0.0 and abs(by_wheels) > KEPT * SCALE_DOUBT
         state.scale_off = by_wheels if still or abs(shown) > SCALE_DOUBT else 0.0
@@ -327,5 +347,4 @@ def watch_frozen(state: Record, blocks: Record, witness: Record, inputs: Record,
 @kernel
 def correct_accel(state: Record, reading: float) -> float:
     """Return the reading [m/s^2] less what zero and scale are known to have drifted by."""
-    corrected: float = (reading - state.zero_off) / (1.0 + state.scale_off)
-    return corrected
+    return float((reading - state.zero_off) / (1.0 + state.scale_off))

@@ -1,21 +1,28 @@
-"""Line between two decelerations, y = c + s h, by a Kalman filter of two states, and its means.
+"""Line between two decelerations, y = c + s h, by a Kalman filter of two states, and what it usually is.
 
-`accel_error.py` has two: by what they have moved from their means, an error that comes shows.
+`accel_error.py` has two: by what they have moved from the usual line, an error that comes shows.
 """
+
+import math
 
 import numpy as np
 
 from ecu.algorithm.monitoring.acceleration import BLOCK_S
 from ecu.jit import Record, kernel
 
-LINE_STATE = np.dtype(
+_FIT = np.dtype(
     [
         ("offset", "f8"),  # m/s^2
         ("scale", "f8"),
         ("p", "f8", (3,)),  # variances of both, covariance
-        ("usual_offset", "f8"),  # mean while nothing has moved [m/s^2]
-        ("usual_scale", "f8"),
-        ("offset_s", "f8"),  # learning times of these [s]
+    ],
+    align=True,
+)
+LINE_STATE = np.dtype(
+    [
+        ("now", _FIT),
+        ("usual", _FIT),  # while nothing has moved
+        ("offset_s", "f8"),  # learning times of that [s]
         ("scale_s", "f8"),
     ],
     align=True,
@@ -46,25 +53,31 @@ def widen_line(line: Record, offset: float, scale: float) -> None:
 
 
 @kernel
+def sigma_line(line: Record, h: float) -> float:
+    """Return the standard deviation of a line at `h` [m/s^2]."""
+    return math.sqrt(max(line.p[0] + h * (2.0 * line.p[2] + h * line.p[1]), 0.0))
+
+
+@kernel
 def learn_offset(line: Record, memory_s: float) -> None:
     line.offset_s = min(line.offset_s + BLOCK_S, memory_s)
-    line.usual_offset += (line.offset - line.usual_offset) * BLOCK_S / line.offset_s
+    line.usual.offset += (line.now.offset - line.usual.offset) * BLOCK_S / line.offset_s
 
 
 @kernel
 def learn_scale(line: Record, memory_s: float) -> None:
     line.scale_s = min(line.scale_s + BLOCK_S, memory_s)
-    line.usual_scale += (line.scale - line.usual_scale) * BLOCK_S / line.scale_s
+    line.usual.scale += (line.now.scale - line.usual.scale) * BLOCK_S / line.scale_s
 
 
 @kernel
 def moved_offset(line: Record) -> float:
     """Return what the offset of a line has moved by [m/s^2]; of that by the wheels it is c less the slope."""
-    moved: float = line.offset - line.usual_offset
+    moved: float = line.now.offset - line.usual.offset
     return moved
 
 
 @kernel
 def moved_scale(line: Record) -> float:
-    moved: float = line.scale - line.usual_scale
+    moved: float = line.now.scale - line.usual.scale
     return moved

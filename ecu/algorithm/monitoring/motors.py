@@ -110,10 +110,10 @@ def watch_motors(
     if apart * accel_offset > 0.0:
         apart -= math.copysign(min(abs(accel_offset), abs(apart)), apart)
     moves = speed > LEAST_SPEED and estimate.measured != 0 and estimate.backwards == 0
-    if not (moves and usable(inputs, ACCEL_X)) or others_brake(inputs):
+    if not (moves and usable(inputs, ACCEL_X)) or others_brake(inputs) or accel_doubted(lines):
         return
     driven = -(state.decel[0] + state.decel[1] + state.decel[2] + state.decel[3])
-    tolerance = torques_tolerance(params, blocks.mean)
+    tolerance = torques_tolerance(params, lines, blocks.mean)
     if blocks.time == 0.0 and usual_known(lines):
         _judge_moved(params, state, witness, inputs, lines, blocks, tolerance)
     explained = abs(apart) < AGAIN + AGAIN_SHARE * driven

@@ -11,6 +11,7 @@ from ecu.algorithm.inputs import LEAST_REQUEST, driver_accelerates, others_brake
 from ecu.algorithm.monitoring.accel_error import (
     PROVEN_S,
     accel_doubted,
+    accel_unknown,
     all_wheels_scaled,
     correct_accel,
     follow_accel_error,
@@ -60,7 +61,7 @@ def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
     """Return the fault bits of accelerometer, motors and speeds by the torques, where these are known."""
     faults, estimate = 0, s.estimate
     braking = s.application.braking != 0
-    base, slope = s.control.base, s.accel_error.wheels.usual_offset
+    base, slope = s.control.base, s.accel_error.wheels.usual.offset
     watch_acceleration(p, s.acceleration, s.witness, u, estimate, base, slope, braking, dt)
     watch_frozen(s.accel_error, s.acceleration, s.witness, u, dt)
     if s.acceleration.time == 0.0 and not s.witness.rejected[ACCEL_X]:
@@ -168,7 +169,7 @@ def _mask_contradicted(s: Record, u: Record) -> None:
     for i in range(4):
         if s.witness.rejected[MOTOR_TORQUE + i] and s.application.braking:
             u.value[MOTOR_TORQUE + i] = s.blending.asked[0, i]
-    if s.acceleration.implausible:
+    if s.acceleration.implausible or accel_unknown(s.accel_error):
         _distrust(s, u, ACCEL_X)
 
 

@@ -6,6 +6,7 @@ import pytest
 from ecu.algorithm.estimate import ESTIMATE
 from ecu.algorithm.monitoring.accel_error import (
     ACCEL_ERROR_STATE,
+    accel_unknown,
     correct_accel,
     follow_accel_error,
     watch_frozen,
@@ -161,6 +162,28 @@ def test_when_the_accelerometer_is_reported(params, feed, case, wrong, after: fl
     else:
         assert car.reported is not None
         assert 1.0 < car.reported - 48.0 < after
+
+
+AT_ONCE = [
+    # what errs after two drives; is it reported in the next one
+    ("nothing", {}, False),
+    ("the accelerometer's zero by 0.25 m/s2", {"zero": 0.25}, True),
+    ("by -0.25 m/s2", {"zero": -0.25}, True),
+    ("its scale by 7 %", {"scale": 0.07}, True),
+    ("by -7 %", {"scale": -0.07}, True),
+    ("the slope by 0.25 m/s2", {"slope": 0.25}, False),
+    ("motor torques by 7 %", {"motors": 1.07}, False),
+]
+
+
+@pytest.mark.parametrize(("case", "wrong", "reported"), AT_ONCE, ids=[c[0] for c in AT_ONCE])
+def test_an_error_that_stays_is_not_learned_as_usual(params, feed, case, wrong, reported: bool) -> None:
+    car = Car(params, feed)
+    car.drive(24.0)
+    car.drive(4.0, **wrong)
+    print(car.state)
+    assert bool(car.state["reported"]) == reported
+    assert accel_unknown(car.state) == reported
 
 
 @pytest.mark.parametrize(("stands", "reported"), [(0.0, True), (15.0, False)])

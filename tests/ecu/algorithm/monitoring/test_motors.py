@@ -49,7 +49,7 @@ class Car:
         decel, p = np.broadcast_to(decel, 4), self.p
         drag = p["drag_area"] * speed**2 / p["mass"] + p["rolling_resistance"] * GRAVITY
         accel = -(decel.sum() + 4.0 * lining + drag + off)
-        self.lines["wheels"]["offset"], self.blocks["time"] = accel_offset, 0.05
+        self.lines["wheels"]["now"]["offset"], self.blocks["time"] = accel_offset, 0.05
         self.estimate["speed"], self.estimate["brake_torque"] = speed, lining * self.unit
         for _ in range(round(seconds / DT)):
             self.feed(
@@ -212,6 +212,13 @@ def test_a_motor_that_drove_as_usual_and_gives_far_less_has_a_wrong_limit(
     assert car.blending["lost"].all() == car.blending["lost"].any() == short
 
 
+def test_an_accelerometer_that_is_known_to_drift_accuses_no_motor(car: Car) -> None:
+    car.lines["reported"] = 1
+    assert car.drive(9.0, 0.5, reads=0.5) == ()
+    car.lines["reported"] = 0
+    assert car.drive(9.0, 0.5, reads=0.5) == ALL
+
+
 def test_a_motor_that_drove_wrongly_is_not_short(car: Car) -> None:
     car.known(10.0, **DRIVES)
     car.state["moved_s"] = 0.1
@@ -252,7 +259,7 @@ MOVED = [
 def test_which_motor_no_longer_drives_the_car_as_it_used_to(car: Car, what, seconds, left_out) -> None:
     assert car.known(10.0, **DRIVES) == ()
     what = dict(what)
-    car.lines["wheels"]["offset"] = what.pop("wheels", 0.0)
+    car.lines["wheels"]["now"]["offset"] = what.pop("wheels", 0.0)
     assert car.known(seconds, **what) == left_out
 
 
