@@ -49,12 +49,14 @@ HYDRAULICS_STATE = np.dtype(
         ("agreed_s", "f8", (4,)),  # time for which model and sensor have agreed
         ("late", "f8", (2,)),  # lateness beyond that of CONFIG, of a rise and a fall [s]
         ("late_known", "f8", (2,)),  # 1 / variance of it, without what was unknown before [1/s^2]
+        ("late_kept", "f8", (2, 2)),  # both, as the brakes were released last
     ],
     align=True,
 )
 
 LONGEST_GAP = 100  # cycles
 WALK = 0.1  # bar/sqrt(s)
+RELEASED = 0.5  # bar
 SHARE = 0.15  # of a change, one standard deviation
 SMOOTHED = 0.08  # the same, assumed for the gain: noise that motors follow costs more than lag
 DISAGREEMENT_LAG = 0.4  # s
@@ -136,6 +138,10 @@ def learn_lateness(
     """
     if dt > 1.5 * CYCLE:  # the missed cycles are made up for later
         return
+    if max(state.model[0], state.model[1], state.model[2], state.model[3]) < RELEASED:
+        for direction in (RISE, FALL):
+            state.late_kept[0, direction] = state.late[direction]
+            state.late_kept[1, direction] = state.late_known[direction]
     for direction in (RISE, FALL):
         behind, known = _behind(params, state, inputs, zero, failed, direction)
         if known == 0.0:
@@ -147,6 +153,14 @@ def learn_lateness(
         late = state.late[direction]
         late += known / (state.late_known[direction] + 1.0 / UNKNOWN**2) * (found - late)
         state.late[direction] = min(max(late, (LEAST_STRETCH - 1.0) * usual), (LARGEST_STRETCH - 1.0) * usual)
+
+
+@kernel
+def forget_lateness(state: Record) -> None:
+    """Take back what this application has taught of lateness: its readings were wrong."""
+    for direction in (RISE, FALL):
+        state.late[direction] = state.late_kept[0, direction]
+        state.late_known[direction] = state.late_kept[1, direction]
 
 
 @kernel

@@ -34,6 +34,7 @@ PRESSURES_STATE = np.dtype(
         ("honest", "u1"),  # the deceleration agrees with the readings, not with the model
         ("doubt_s", "f8", (4,)),  # excess time for which a reading was too far off
         ("wrong", "u1", (4,)),  # the model stands for this reading
+        ("shown_at", "f8", (4,)),  # modelled pressure at which that showed [bar]
     ],
     align=True,
 )
@@ -43,13 +44,14 @@ STEADY = 20.0  # bar/s: at quicker changes lag differs more than sensors do
 LEARN_S, WEAK = 0.5, 15.0  # s, bar: at this pressure a ratio is learned half as fast
 OFFSET, RATIO = 3.0, 0.1  # bar, 1: no hydraulics and sensor that are sound differ more
 LEAST_SCALED = 3.0  # bar, of a ratio's effect: at low pressures noise and zero are a ratio
-LARGEST_OFFSET, LARGEST_RATIO = 4.5, 0.15  # learned: a sensor that recovers is soon believed again
+LARGEST_OFFSET, LARGEST_RATIO = 4.5, 0.5  # bar, 1: learned
 FAR, FAR_SHARE = 8.0, 0.2  # bar, of the pressure: too far off for noise and lag
 ABOVE = 16.0  # bar, of one sample: noise of 3 bar that is cut off sooner is a bias
 KEPT, KEPT_SHARE = 0.6, 0.025  # bar, of the model: so much stays in a reading, of which it is the better one
 LEAST_FORCE, LEAST_SHARE = 0.05, 0.4  # of the weight, of the modelled force: a clear difference
 LEAST_SPEED = 1.0  # m/s: a car at standstill does not show its brakes' force
 SURE_S, DOUBT_S = 0.1, 0.3  # decided by the deceleration, and by nothing but the difference
+SHOWN = 0.5  # of the pressure at which a reading was wrong: at none, one that is scaled agrees
 
 
 @kernel
@@ -148,14 +150,24 @@ def compare_pressures(
                 scaled = compare(witness, place, state.ratio[i] * model[i], RATIO * model[i])
         if max(far, offset, scaled) > 1.0:
             state.doubt_s[i] = min(state.doubt_s[i] + dt, 2.0 * DOUBT_S)
-        else:
+        elif not state.wrong[i] or model[i] >= SHOWN * state.shown_at[i]:
             state.doubt_s[i] = max(state.doubt_s[i] - dt, 0.0)
         if state.doubt_s[i] > (SURE_S if decides else DOUBT_S):
-            begins = begins or not state.wrong[i]
+            if not state.wrong[i]:
+                begins, state.shown_at[i] = True, model[i]
             state.wrong[i] = 1
         elif state.doubt_s[i] == 0.0:
             state.wrong[i] = 0
     return begins
+
+
+@kernel
+def pressures_doubted(state: Record) -> bool:
+    """Return whether a pressure is far off and not yet replaced: the torques of the linings are not known."""
+    doubted = False
+    for i in range(4):
+        doubted = doubted or (state.doubt_s[i] > 0.0 and state.wrong[i] == 0)
+    return doubted
 
 
 @kernel

@@ -6,7 +6,7 @@ estimation, by the estimate of the last cycle.
 
 import math
 
-from ecu.algorithm.hydraulics import learn_lateness
+from ecu.algorithm.hydraulics import forget_lateness, learn_lateness
 from ecu.algorithm.inputs import LEAST_REQUEST, driver_accelerates, others_brake, requested_decel, usable
 from ecu.algorithm.monitoring.accel_error import (
     PROVEN_S,
@@ -34,6 +34,7 @@ from ecu.algorithm.monitoring.pressures import (
     beyond_noise,
     compare_pressures,
     lasting_difference,
+    pressures_doubted,
 )
 from ecu.algorithm.monitoring.speeds import SPEED, watch_speeds
 from ecu.algorithm.monitoring.turning import watch_turning
@@ -71,7 +72,8 @@ def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
     above = s.speeds.apart[SPEED] - s.speeds.base[SPEED] if usable(u, VEHICLE_SPEED) else math.nan
     if all_wheels_scaled(s.accel_error, above, estimate.accel_x):
         faults |= ALL_WHEELS
-    if s.accel_error.proven_s > PROVEN_S and not wheels_deny(s.acceleration):
+    known = s.accel_error.proven_s > PROVEN_S and not wheels_deny(s.acceleration)
+    if known and not pressures_doubted(s.pressures):
         watch_motors(p, s.motors, s.witness, u, estimate, base, s.accel_error, s.acceleration, dt)
     asked = braking and requested_decel(p, u) > LEAST_REQUEST
     if asked and s.plausibility.sent and not (driver_accelerates(u) or others_brake(u)):
@@ -120,7 +122,9 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
     if s.acceleration.implausible:
         faults |= ACCEL_IMPLAUSIBLE
     begins = s.acceleration.implausible != 0 and not doubted
-    if p.transmit and s.plausibility.sent and not others_brake(u):
+    wrong = s.pressures.wrong
+    right = max(wrong[0], wrong[1], wrong[2], wrong[3]) == 0
+    if right and p.transmit and s.plausibility.sent and not others_brake(u):
         learn_lateness(p, s.hydraulics, u, estimate.pressure_zero, s.failed_brakes.failed, dt)
     watch_pressures(s.plausibility, u, s.hydraulics.model, estimate.pressure_zero, dt)
     if s.plausibility.pressure:
@@ -140,6 +144,8 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
     for i in range(4):
         if s.pressures.doubt_s[i] > DOUBT_S:
             faults |= PRESSURE_IMPLAUSIBLE << i
+    if contradicted:
+        forget_lateness(s.hydraulics)
     return faults, begins or fails or contradicted
 
 

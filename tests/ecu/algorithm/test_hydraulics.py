@@ -15,6 +15,7 @@ from ecu.algorithm.hydraulics import (
     advance_pressures,
     correct_pressures,
     follows_demand,
+    forget_lateness,
     lateness,
     learn_lateness,
     slowness,
@@ -357,6 +358,19 @@ def learn(callipers: Callipers, kind, times: float, seed: int, scale=1.0, slow=1
         c.feed(c.inputs, calliper_pressure=scale * true[k] + SIGMA * random.standard_normal(4))
         learn_lateness(c.p, c.state, c.inputs[0], c.zero, c.failed, dt)
         advance_pressures(c.p, c.state, np.full(4, demand[k - 1] * BAR))
+
+
+def test_what_an_application_has_taught_of_lateness_can_be_taken_back(callipers) -> None:
+    learn(callipers, BUILD_UP, 2.0, 0)
+    c, state = callipers, callipers.state
+    before = state["late"].copy(), state["late_known"].copy()
+    for model in (0.0, 40.0):
+        state["model"], state["rate"] = model, 0.0
+        learn_lateness(c.p, state, c.inputs[0], c.zero, c.failed, DT)
+    state["late"], state["late_known"] = 0.12, 4e4
+    forget_lateness(state)
+    assert (state["late"] == before[0]).all()
+    assert (state["late_known"] == before[1]).all()
 
 
 @pytest.mark.parametrize("times", [0.5, 1.0, 1.5, 2.0, 4.0])

@@ -100,6 +100,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "accel",
         "kept_s",
         "let_go_s",
+        "late_kept",
         "now",
         "usual",
     ),

@@ -119,6 +119,29 @@ def test_a_reading_far_off_is_wrong_unless_the_deceleration_agrees_with_it(
     assert brakes.state["wrong"].all() == wrong == brakes.state["wrong"].any(), name
 
 
+def test_a_reading_is_believed_again_at_pressures_at_which_it_was_wrong(params, feed) -> None:
+    """At released brakes a reading of the other sign is right, and wrong in the next braking again."""
+    brakes = Brakes(params, feed, lambda bar: -bar)
+    brakes.hold(1.0, 50.0)
+    for bar, again, believed in ((0.0, -1.0, False), (20.0, 1.0, False), (30.0, 1.0, True)):
+        brakes.sensor = lambda read, again=again: again * read
+        brakes.hold(3.0, bar)
+        assert brakes.state["wrong"].all() != believed, bar
+
+
+@pytest.mark.parametrize(("share", "wrong"), [(0.6, True), (0.75, False)])
+def test_all_that_lasts_at_a_low_pressure_is_taken_out(params, feed, share: float, wrong: bool) -> None:
+    """It is friction's otherwise, which rises by as much; nothing tells it from a force of 12 bar."""
+    brakes = Brakes(params, feed)
+    brakes.hold(5.0, 0.0)
+    brakes.sensor = lambda bar: share * bar
+    brakes.hold(8.0, 11.0)
+    left = (share - 1.0) * 11.0 - np.mean(brakes.taken_out(11.0))
+    print(f"{left:+.2f} bar left")
+    assert abs(left) < KEPT + KEPT_SHARE * 11.0
+    assert brakes.state["wrong"].all() == wrong == brakes.state["wrong"].any()
+
+
 @pytest.mark.parametrize(
     ("bar", "honest", "beyond"), [(0.0, 0, False), (39.0, 0, False), (41.0, 0, True), (41.0, 1, False)]
 )
