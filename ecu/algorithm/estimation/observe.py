@@ -21,6 +21,7 @@ from ecu.algorithm.estimation.joint.prediction import (
 )
 from ecu.algorithm.estimation.joint.prior import begin_application, end_application, forget_levels
 from ecu.algorithm.estimation.joint.sliding import suspend_learning
+from ecu.algorithm.estimation.joint.snapshot import keep_calm_snapshot, take_calm_snapshot
 from ecu.algorithm.estimation.joint.speed import doubt_speed
 from ecu.algorithm.estimation.joint.whole_application import (
     add_coasting,
@@ -117,7 +118,7 @@ def observe(
         u: `INPUTS` with implausible ones masked out.
         heat: relative standard deviation that each friction has gained by its disc's temperature.
         guarded: the slip guard holds a wheel: the last snapshot is restored.
-        contradicted: a sensor or a stream has just become implausible: likewise.
+        contradicted: a sensor or a stream has just become implausible: that of before it disagreed is.
         dt: time since the last cycle [s].
     """
     braking, e = s.application.braking != 0, s.estimate
@@ -157,11 +158,15 @@ def _observe_jointly(
         begin_prediction(p, s.prediction, joint)
         begin_application(joint, heat)
     joint.held = 1 if s.whole.alone or s.whole.bent else 0
+    if contradicted and joint.hold_s <= 0.0:
+        take_calm_snapshot(joint)
     if guarded or contradicted:
         suspend_learning(joint)
     if contradicted and s.motion.measured == 0:
         doubt_speed(p, joint, u)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.hydraulics, braking, dt)
+    if joint.closed and joint.kept_s == 0.0 and s.witness.calm:
+        keep_calm_snapshot(joint)
     if joint.closed and p.transmit:
         follow_ceiling(p, joint, s.guard.capped, braking)
     if joint.closed and joint.released and not p.transmit:

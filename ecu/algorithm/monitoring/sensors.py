@@ -39,7 +39,7 @@ from ecu.algorithm.monitoring.pressures import (
 from ecu.algorithm.monitoring.speeds import SPEED, watch_speeds
 from ecu.algorithm.monitoring.turning import watch_turning
 from ecu.algorithm.monitoring.wheel_unit import watch_wheel_unit
-from ecu.algorithm.monitoring.witness import believe, leave_out, rejected_faults
+from ecu.algorithm.monitoring.witness import believe, leave_out, note_named, rejected_faults
 from ecu.contract.faults import (
     ACCEL_IMPLAUSIBLE,
     BRAKE_FAILED,
@@ -54,6 +54,8 @@ from ecu.jit import Record, kernel
 ACCEL_X_DRIFTED = IMPLAUSIBLE["accel_x"]
 ALL_WHEELS = 0b1111 * IMPLAUSIBLE["wheel_speed_fl"]
 PRESSURE_IMPLAUSIBLE = IMPLAUSIBLE["calliper_pressure_fl"]
+NAMES = ACCEL_IMPLAUSIBLE | BRAKE_FAILED
+BY_TORQUES = sum(IMPLAUSIBLE.values())  # named where this ECU brakes
 LEFT_OUT_S = 0.03  # duration of a pressure's deviation from its demand
 
 
@@ -105,7 +107,6 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
         dt: time since the last cycle [s].
     """
     faults = 0
-    doubted = s.acceleration.implausible != 0
     estimate = s.estimate
     if estimate.started:
         if estimate.torques_known:
@@ -121,7 +122,6 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
         _forget_speeds(s)
     if s.acceleration.implausible:
         faults |= ACCEL_IMPLAUSIBLE
-    begins = s.acceleration.implausible != 0 and not doubted
     wrong = s.pressures.wrong
     right = max(wrong[0], wrong[1], wrong[2], wrong[3]) == 0
     if right and p.transmit and s.plausibility.sent and not others_brake(u):
@@ -129,12 +129,10 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
     watch_pressures(s.plausibility, u, s.hydraulics.model, estimate.pressure_zero, dt)
     if s.plausibility.pressure:
         faults |= PRESSURE_NOT_FOLLOWING
-    failed = s.failed_brakes.any != 0
     watch_brakes(
         p, s.failed_brakes, u, estimate, s.control, s.hydraulics.model, s.pressures.rest,
         s.plausibility.sent != 0, dt,
     )  # fmt: skip
-    fails = s.failed_brakes.any != 0 and not failed
     if s.failed_brakes.any:
         faults |= BRAKE_FAILED
     contradicted = compare_pressures(
@@ -146,7 +144,8 @@ def watch_sensors(p: Record, s: Record, u: Record, dt: float) -> tuple[int, bool
             faults |= PRESSURE_IMPLAUSIBLE << i
     if contradicted:
         forget_lateness(s.hydraulics)
-    return faults, begins or fails or contradicted
+    named = note_named(s.witness, faults & (NAMES | BY_TORQUES if p.transmit else NAMES))
+    return faults, named or contradicted
 
 
 @kernel

@@ -24,6 +24,8 @@ WITNESS_STATE = np.dtype(
         ("doubted_s", "f8", (N_INPUTS,)),
         ("agreed_s", "f8", (N_INPUTS,)),
         ("rejected", "u1", (N_INPUTS,)),
+        ("named", "i8"),  # mask of the faults of sensors in the last cycle
+        ("calm", "u1"),  # each input agreed with the others when it was last compared
     ],
     align=True,
 )
@@ -123,6 +125,17 @@ def judge(state: Record, place: int, innovation: float, tolerance: float, doubt_
 def believe(state: Record, place: int) -> None:
     """Accept an input again."""
     state.rejected[place], state.doubted_s[place] = 0, 0.0
+
+
+@kernel
+def note_named(state: Record, named: int) -> bool:
+    """Note the faults of sensors in this cycle, and whether all inputs agree; return whether one is new."""
+    new = named & ~state.named
+    state.named, state.calm = named, 1
+    for place in WATCHED:
+        if state.published.ratio[place] > AGREES:
+            state.calm = 0
+    return new != 0
 
 
 @kernel

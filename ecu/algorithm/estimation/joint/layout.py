@@ -96,6 +96,8 @@ JOINT_STATE: Final = np.dtype(
         ("kept_x", "f8", (2, N)),  # snapshots: the newer in row 0
         ("kept_p", "f8", (2, N, N)),
         ("kept_s", "f8"),  # age of the newer one [s]
+        ("calm_x", "f8", (N,)),  # the last that was saved while all inputs agreed
+        ("calm_p", "f8", (N, N)),
         ("unkept_s", "f8"),  # since it was last stored into the learned values [s]
         ("window", WINDOW_STATE),
         ("motors", MOTORS_STATE),

@@ -56,7 +56,7 @@ from ecu.algorithm.estimation.joint.prior import (
 )
 from ecu.algorithm.estimation.joint.reference import correct_by_reference
 from ecu.algorithm.estimation.joint.sliding import HOLD_S, share_force, watch_tyres
-from ecu.algorithm.estimation.joint.snapshot import restore_snapshot, save_newer_snapshot, save_snapshot
+from ecu.algorithm.estimation.joint.snapshot import restore_snapshot, save_newer_snapshot, save_snapshots
 from ecu.algorithm.estimation.joint.speed import (
     DRIVEN_ACCEL,
     LOST_S,
@@ -101,8 +101,7 @@ def start_joint(state: Record) -> None:
     """Start from the present states, except the speed."""
     state.started = 0
     open_window(state)
-    save_snapshot(state, 0)
-    save_snapshot(state, 1)
+    save_snapshots(state)
 
 
 @kernel

@@ -1,4 +1,5 @@
-"""Snapshots of the state, restored when it was learned from a wheel about to lock."""
+"""Snapshots of the state: of 0.2 to 0.4 s ago, for when a wheel is about to lock; of the last time at which
+all inputs agreed, for when one of them is named: what it has taught since is taken back."""
 
 from ecu.algorithm.estimation.joint.kalman import forget_speed
 from ecu.algorithm.estimation.joint.layout import N, V
@@ -23,6 +24,24 @@ def _copy(state: Record, row: int, to: int) -> None:
 
 
 @kernel
+def keep_calm_snapshot(state: Record) -> None:
+    """Keep the older snapshot: all inputs agree."""
+    for i in range(N):
+        state.calm_x[i] = state.kept_x[1, i]
+        for j in range(N):
+            state.calm_p[i, j] = state.kept_p[1, i, j]
+
+
+@kernel
+def take_calm_snapshot(state: Record) -> None:
+    """Make it the older snapshot, which is restored next."""
+    for i in range(N):
+        state.kept_x[1, i] = state.calm_x[i]
+        for j in range(N):
+            state.kept_p[1, i, j] = state.calm_p[i, j]
+
+
+@kernel
 def restore_snapshot(state: Record) -> None:
     """Restore the older snapshot except the speed, which becomes uncertain."""
     for i in range(N):
@@ -33,6 +52,14 @@ def restore_snapshot(state: Record) -> None:
     forget_speed(state)
     _copy(state, 1, 0)
     state.kept_s = 0.0
+
+
+@kernel
+def save_snapshots(state: Record) -> None:
+    """Save the present state and covariance over all snapshots."""
+    save_snapshot(state, 0)
+    save_snapshot(state, 1)
+    keep_calm_snapshot(state)
 
 
 @kernel

@@ -128,6 +128,7 @@ def _hand_over_scale(state: Record, joint: Record) -> None:
         joint.x[i] += state.filter.value[SCALE]
         for snapshot in range(2):
             joint.kept_x[snapshot, i] += state.filter.value[SCALE]
+        joint.calm_x[i] += state.filter.value[SCALE]
     state.filter.value[SCALE] = 0.0
 
 

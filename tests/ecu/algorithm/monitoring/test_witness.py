@@ -13,6 +13,7 @@ from ecu.algorithm.monitoring.witness import (
     end_watch,
     judge,
     leave_out,
+    note_named,
     rejected_faults,
 )
 from ecu.contract.faults import IMPLAUSIBLE
@@ -117,3 +118,20 @@ def test_who_is_left_out_is_not_used(state, feed) -> None:
     assert published(state, "value", "rejected", "unused_s") == pytest.approx(
         [math.nan, 0, 3 * DT], nan_ok=True
     )
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "new"), [(0, 0, False), (0, 4, True), (4, 4, False), (4, 6, True), (4, 0, False)]
+)
+def test_a_name_is_new_once(state, before: int, now: int, new: bool) -> None:
+    note_named(state, before)
+    assert note_named(state, now) == new
+    assert not note_named(state, now)
+
+
+@pytest.mark.parametrize(("innovation", "calm"), [(math.nan, True), (0.4, True), (0.6, False), (-0.6, False)])
+def test_inputs_are_calm_within_half_of_their_tolerances(state, innovation: float, calm: bool) -> None:
+    state["published"]["ratio"] = math.nan
+    compare(state, PLACE, innovation, 1.0)
+    note_named(state, 0)
+    assert bool(state["calm"]) == calm

@@ -1,9 +1,16 @@
-"""Snapshots by themselves: two deep, the older one comes back in all but the speed."""
+"""Snapshots by themselves: two deep, the older one comes back in all but the speed; and the last calm one."""
 
 import numpy as np
 
 from ecu.algorithm.estimation.joint.layout import JOINT_STATE, N, V
-from ecu.algorithm.estimation.joint.snapshot import restore_snapshot, save_newer_snapshot, save_snapshot
+from ecu.algorithm.estimation.joint.snapshot import (
+    keep_calm_snapshot,
+    restore_snapshot,
+    save_newer_snapshot,
+    save_snapshot,
+    save_snapshots,
+    take_calm_snapshot,
+)
 
 
 def marked(value: float):
@@ -46,3 +53,19 @@ def test_the_older_comes_back_in_all_but_the_speed() -> None:
     assert (state["p"][V, others] == 0.0).all()
     assert (state["p"][others, V] == 0.0).all()
     assert state["p"][V, V] == 0.5**2
+
+
+def test_the_calm_one_comes_back_however_old_it_is() -> None:
+    state = marked(1.0)
+    save_snapshots(state)
+    for value in (2.0, 3.0, 4.0, 5.0, 6.0):
+        state["x"], state["p"] = value, value
+        save_newer_snapshot(state)
+        if value <= 4.0:
+            keep_calm_snapshot(state)
+    take_calm_snapshot(state)
+    restore_snapshot(state)
+    others = np.arange(N) != V
+    assert (state["x"][others] == 3.0).all()
+    assert (state["kept_x"] == 3.0).all()
+    assert (state["p"][np.ix_(others, others)] == 3.0).all()
