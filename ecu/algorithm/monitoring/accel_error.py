@@ -27,7 +27,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import fresh
-from ecu.algorithm.monitoring.acceleration import BLOCK_S, ROLLED, A, F, W
+from ecu.algorithm.monitoring.acceleration import BLOCK_S, ROLLED, SHOWN, A, F, W
 from ecu.algorithm.monitoring.error_line import (
     LINE_STATE,
     SCALE_MOST,
@@ -48,11 +48,11 @@ ACCEL_ERROR_STATE = np.dtype(
     [
         ("wheels", LINE_STATE),  # c, s
         ("torques", LINE_STATE),  # b, k
-        ("apart", "f8"),  # reading less the torques' deceleration, beside its mean at that force, low-passed;
-        # 0 while it is not known [m/s^2]
+        ("apart", "f8"),  # reading less the torques' deceleration, beside the usual, low-passed [m/s^2]
         ("proven_s", "f8"),  # time for which the motors' torques alone have driven the car, at most `SURE_S`
         ("doubted_s", "f8"),  # time for which both lines have moved to the same side, at most `REPORTED_S`
         ("reported", "u1"),  # that has lasted
+        ("shown_at", "f8"),  # force at which it did [m/s^2]: a scale shows at none less
         ("rolls_s", "f8"),  # time for which the scale of the wheels' line alone has moved, at most `ROLLS_S`
         ("rolls_wrong", "u1"),  # that has lasted: all wheel speeds may be scaled
         ("rolls_shown", "u1"),  # it has, while the car speeds up this time
@@ -83,8 +83,7 @@ FEWEST_S, FEWEST_SCALE_S, FEWEST_REPORTED_S = 2.0, 3.0, 5.0
 APART_S = 0.5
 KNOWN_OFFSET = 0.06  # m/s^2, standard deviation: forces of one size do not tell a zero from a scale
 UNSEEN, UNSEEN_SHARE, WIND = 0.1, 0.03, 0.25  # m/s^2, of the force, of the drag: what torques may differ by
-MOVED, REPORTED_S = 0.1, 0.4  # m/s^2, s
-SIGMAS = 2.0  # of the usual line
+MOVED, REPORTED_S, SIGMAS = 0.1, 0.4, 2.0  # m/s^2, s, of the usual line
 ROLLS, ROLLS_S, ROLLS_TIMES = 0.05, 1.0, 3  # of the speed; s; -
 ROLLS_FREE = 1.0  # m/s^2
 UNMOVED = 0.4  # of that, what the torques show of it
@@ -94,10 +93,8 @@ SCALE_DOUBT = 0.033  # of the lesser of both; sound cars stay below 0.032
 PROVING, ENGINE, ENGINE_ZERO = 1.0, 0.2, 0.25  # m/s^2; of it, m/s^2: what an unreported engine exceeds
 PROVEN_S, SURE_S, REFUTES = 0.5, 3.0, 5.0  # s, s; times as fast as it is proven
 USUAL = 0.5  # of that, within which the torques are as usual
-CONFIRMED = 0.5  # of the zero, what the wheels must show of it too
-KEPT = 0.4
-SAME_S = 0.6  # the blocks whose deceleration is compared
-CHANGED = 1.0  # m/s^2, of the wheels' deceleration meanwhile
+CONFIRMED, KEPT = 0.5, 0.4  # of the zero, what the wheels must show of it too; of a doubt, what keeps it
+SAME_S, CHANGED = 0.6, 1.0  # s of blocks that are compared; m/s^2, of the wheels' deceleration meanwhile
 
 
 @kernel
@@ -189,7 +186,7 @@ def _compare_scales(params: Record, state: Record, mean: Record, witness: Record
         state.rolls_shown = 0
     if force < LEAST_SHOWN:
         return
-    alone = abs(state.apart) < UNMOVED * abs(moved) * force
+    alone = abs(state.apart) + _unsure(state, mean) < UNMOVED * abs(moved) * force
     if alone:
         for i in range(4):
             turns = mean[0, ROLLED] / params.wheel_radius[i]
@@ -235,9 +232,12 @@ def _compare_lines(state: Record, mean: Record, witness: Record) -> None:
     if agree:
         compare(witness, ACCEL_X, moved, doubt)
     stands = abs(moved) > (KEPT if state.reported else 1.0) * doubt
-    change = BLOCK_S if stands and (agree or state.reported != 0) else -BLOCK_S
-    state.doubted_s = min(max(state.doubted_s + change, 0.0), REPORTED_S)
+    if stands and (agree or state.reported != 0):
+        state.doubted_s = min(state.doubted_s + BLOCK_S, REPORTED_S)
+    elif not state.reported or abs(mean[0, F]) > SHOWN * state.shown_at:
+        state.doubted_s = max(state.doubted_s - BLOCK_S, 0.0)
     lasts = state.doubted_s > (0.0 if state.reported else REPORTED_S - 0.5 * BLOCK_S)
+    state.shown_at = abs(mean[0, F]) if not state.reported else state.shown_at
     state.reported = 1 if lasts else 0
 
 

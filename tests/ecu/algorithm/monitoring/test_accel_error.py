@@ -184,6 +184,8 @@ def test_an_error_that_stays_is_not_learned_as_usual(params, feed, case, wrong, 
     print(car.state)
     assert bool(car.state["reported"]) == reported
     assert accel_unknown(car.state) == reported
+    car.drive(2.5, **wrong)  # coasting, where a scale does not show
+    assert bool(car.state["reported"]) == reported
 
 
 @pytest.mark.parametrize(("stands", "reported"), [(0.0, True), (15.0, False)])

@@ -132,6 +132,7 @@ def test_a_name_is_new_once(state, before: int, now: int, new: bool) -> None:
 @pytest.mark.parametrize(("innovation", "calm"), [(math.nan, True), (0.4, True), (0.6, False), (-0.6, False)])
 def test_inputs_are_calm_within_half_of_their_tolerances(state, innovation: float, calm: bool) -> None:
     state["published"]["ratio"] = math.nan
+    begin_watch(state, DT)
     compare(state, PLACE, innovation, 1.0)
     note_named(state, 0)
     assert bool(state["calm"]) == calm
