@@ -158,6 +158,7 @@ def _observe_jointly(
         begin_prediction(p, s.prediction, joint)
         begin_application(joint, heat)
     joint.held = 1 if s.whole.alone or s.whole.bent else 0
+    joint.calm_s += dt
     if contradicted and joint.hold_s <= 0.0:
         take_calm_snapshot(joint)
     if guarded or contradicted:

@@ -103,6 +103,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "late_kept",
         "calm_x",
         "calm_p",
+        "calm_s",
         "calm",
         "named",
         "now",

@@ -98,6 +98,7 @@ JOINT_STATE: Final = np.dtype(
         ("kept_s", "f8"),  # age of the newer one [s]
         ("calm_x", "f8", (N,)),  # the last that was saved while all inputs agreed
         ("calm_p", "f8", (N, N)),
+        ("calm_s", "f8"),  # time since then [s]
         ("unkept_s", "f8"),  # since it was last stored into the learned values [s]
         ("window", WINDOW_STATE),
         ("motors", MOTORS_STATE),

@@ -5,6 +5,8 @@ from ecu.algorithm.estimation.joint.kalman import forget_speed
 from ecu.algorithm.estimation.joint.layout import N, V
 from ecu.jit import Record, kernel
 
+OLDEST_S = 30.0
+
 
 @kernel
 def save_snapshot(state: Record, row: int) -> None:
@@ -26,6 +28,7 @@ def _copy(state: Record, row: int, to: int) -> None:
 @kernel
 def keep_calm_snapshot(state: Record) -> None:
     """Keep the older snapshot: all inputs agree."""
+    state.calm_s = 0.0
     for i in range(N):
         state.calm_x[i] = state.kept_x[1, i]
         for j in range(N):
@@ -34,7 +37,9 @@ def keep_calm_snapshot(state: Record) -> None:
 
 @kernel
 def take_calm_snapshot(state: Record) -> None:
-    """Make it the older snapshot, which is restored next."""
+    """Make it the older snapshot, which is restored next, unless the linings may have changed since."""
+    if state.calm_s > OLDEST_S:
+        return
     for i in range(N):
         state.kept_x[1, i] = state.calm_x[i]
         for j in range(N):

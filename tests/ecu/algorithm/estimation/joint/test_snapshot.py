@@ -1,6 +1,7 @@
 """Snapshots by themselves: two deep, the older one comes back in all but the speed; and the last calm one."""
 
 import numpy as np
+import pytest
 
 from ecu.algorithm.estimation.joint.layout import JOINT_STATE, N, V
 from ecu.algorithm.estimation.joint.snapshot import (
@@ -55,17 +56,18 @@ def test_the_older_comes_back_in_all_but_the_speed() -> None:
     assert state["p"][V, V] == 0.5**2
 
 
-def test_the_calm_one_comes_back_however_old_it_is() -> None:
+@pytest.mark.parametrize(("age", "value"), [(29.0, 3.0), (31.0, 5.0)])
+def test_the_calm_one_comes_back_before_linings_may_have_changed(age: float, value: float) -> None:
     state = marked(1.0)
     save_snapshots(state)
-    for value in (2.0, 3.0, 4.0, 5.0, 6.0):
-        state["x"], state["p"] = value, value
+    for each in (2.0, 3.0, 4.0, 5.0, 6.0):
+        state["x"], state["p"], state["calm_s"] = each, each, age
         save_newer_snapshot(state)
-        if value <= 4.0:
+        if each <= 4.0:
             keep_calm_snapshot(state)
     take_calm_snapshot(state)
     restore_snapshot(state)
     others = np.arange(N) != V
-    assert (state["x"][others] == 3.0).all()
-    assert (state["kept_x"] == 3.0).all()
-    assert (state["p"][np.ix_(others, others)] == 3.0).all()
+    assert (state["x"][others] == value).all()
+    assert (state["kept_x"] == value).all()
+    assert (state["p"][np.ix_(others, others)] == value).all()
