@@ -216,10 +216,10 @@ def all_wheels_scaled(state: Record, over_ground: float, accel: float) -> bool:
         state.rolls_confirmed = 0
         return False
     moved = moved_scale(state.wheels)
+    shows = abs(moved) > KEPT * ROLLS and over_ground * moved > CONFIRMED * moved * moved
     if abs(accel) < ROLLS_FREE:
-        state.rolls_confirmed = 1 if over_ground * moved > CONFIRMED * moved * moved else 0
-    again = state.rolls_times >= ROLLS_TIMES
-    return bool(again if math.isnan(over_ground) else state.rolls_confirmed != 0)
+        state.rolls_confirmed = 1 if shows else 0
+    return bool(state.rolls_times >= ROLLS_TIMES if math.isnan(over_ground) else state.rolls_confirmed != 0)
 
 
 @kernel
