@@ -2,22 +2,26 @@
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import BaseModel
 
-from brakelab.simulation.scenario import Scenario, load_scenario
 from ecu.contract.params import OBSERVERS
 from ecu.errors import UserError
 from ecu.settings.config import Config, load_config
 from ecu.settings.resources import resource
 
+if TYPE_CHECKING:
+    from brakelab.simulation.scenario import Scenario
+
 Model = TypeVar("Model", bound=BaseModel)
 
 
 @cache
-def shipped(name: str) -> Scenario:
+def shipped(name: str) -> "Scenario":
     """Return a scenario of config/scenarios."""
+    from brakelab.simulation.scenario import load_scenario  # a replay needs no scenario
+
     return load_scenario(resource(f"config/scenarios/{name}.toml"))
 
 
