@@ -7,20 +7,18 @@ numpy/arrayscalars.h).
 
 from typing import Any, Final
 
-from numba.core import cgutils, types
-from numba.core.boxing import NativeValue  # the module that tells numba of its own way
-from numba.core.pythonapi import _unboxers
-
 HEAD: Final = object.__basicsize__ + tuple.__itemsize__
 """Bytes of the head of an object of variable size."""
 
 
-def _address(kind: Any, record: Any, at: Any) -> Any:
-    """Return the native value of a record."""
-    pointer = at.context.get_value_type(kind).as_pointer()
-    return NativeValue(at.builder.load(cgutils.pointer_add(at.builder, record, HEAD, pointer)))
-
-
 def take_records_by_address() -> None:
     """Have what numba compiles from now on take records so."""
-    _unboxers.functions[types.Record] = _address
+    from numba.core import cgutils, types  # where something has to be compiled
+    from numba.core.boxing import NativeValue  # the module that tells numba how it takes them itself
+    from numba.core.pythonapi import _unboxers
+
+    def address(kind: Any, record: Any, at: Any) -> Any:
+        pointer = at.context.get_value_type(kind).as_pointer()
+        return NativeValue(at.builder.load(cgutils.pointer_add(at.builder, record, HEAD, pointer)))
+
+    _unboxers.functions[types.Record] = address
