@@ -228,13 +228,14 @@ def test_a_trip_that_was_hardly_counted_is_refused(short_trips):
     )
 
 
-# samples [s] -> which of the seconds 0 … 10 lie in a gap of more than 5 s
+# samples [s] -> which of the seconds 0 … 10 lie in a gap: 2.5 periods and more
 GAPS = {
     "every second": (range(11), []),
-    "six seconds": ([0, 1, 2, 8, 9, 10], [3, 4, 5, 6, 7, 8]),
-    "five seconds": ([0, 1, 2, 7, 8, 9, 10], []),
+    "three seconds": ([0, 1, 2, 3, 6, 7, 8, 9, 10], [4, 5, 6]),
+    "two seconds": ([0, 1, 2, 3, 5, 6, 7, 8, 9, 10], []),
     "late": ([6, 7, 8, 9, 10], [0, 1, 2, 3, 4, 5, 6]),
     "ends early": ([0, 1, 2, 3, 4], [5, 6, 7, 8, 9, 10]),
+    "one sample": ([5], [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10]),
 }
 
 

@@ -49,6 +49,7 @@ COLUMNS: Final = (
 IN_ORDER: Final = (COLUMNS[0], COLUMNS[2], COLUMNS[3], COLUMNS[1], COLUMNS[4])
 """As `Columns.contract` has them."""
 LONGEST_GAP: Final = 5.0  # s between two samples
+MISSED: Final = 2.5  # of the counter's usual period: longer a gap hides a plume
 LEAST_COUNTED: Final = 0.5  # share of a trip
 FEWEST_TRIPS: Final = 3  # for identification: each is left out once
 FEWEST_APPLICATIONS: Final = 20  # applications of a trip
@@ -144,11 +145,12 @@ def off_count(trip: Recorded) -> str:
 
 
 def in_gap(samples: Array, grid: Array) -> NDArray[np.bool_]:
-    """Return which times of a grid lie between samples that are further apart than `LONGEST_GAP`."""
+    """Return which times of a grid lie between samples of a counter that are further apart than usual."""
+    longest = min(LONGEST_GAP, MISSED * float(np.median(np.diff(samples)))) if len(samples) > 1 else 0.0
     edges = np.concatenate([[-np.inf], samples, [np.inf]])
     after = np.searchsorted(edges, grid)
     near = np.minimum(edges[after], grid[-1]) - np.maximum(edges[after - 1], grid[0])
-    return np.asarray(near > LONGEST_GAP)
+    return np.asarray(near > longest)
 
 
 def _read(path: Path, described: Columns) -> dict[str, Array]:
