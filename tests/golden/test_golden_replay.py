@@ -65,4 +65,5 @@ def test_the_drive_is_what_its_description_says(tmp_path: Path) -> None:
     assert 3.6 * brakes["v_in"][0] == pytest.approx(54, abs=3)
     assert brakes["v_end"][0] < 1.0
     assert brakes["decel_mean"][0] == pytest.approx(2.2, abs=0.2)
-    assert brakes["decel_predicted"][0] == pytest.approx(brakes["decel_mean"][0], rel=0.25)
+    off = abs(brakes["decel_predicted"][0] - brakes["decel_mean"][0])
+    assert off < min(brakes["sigma_specific_force"][0], 0.3 * brakes["decel_mean"][0])
