@@ -124,6 +124,10 @@ def test_who_is_late_is_heard(
     assert found.force[2] < 2.5
 
 
+SETTLED = 200
+"""Rows after a swerve, which magnifies any difference."""
+
+
 @pytest.mark.parametrize("seed", [1, 3, 6])
 def test_twelve_seconds_of_frames_that_come_twice_cost_no_learning(seed: int) -> None:
     """Of this car's linings friction changes by -13 to +28 % meanwhile, in one braking from 198 km/h."""
@@ -156,9 +160,12 @@ def test_twelve_seconds_of_frames_that_come_twice_cost_no_learning(seed: int) ->
     print(f"{share.min():.3f} to {share.max():.3f}")
     assert np.all(doubled.outputs["mode"][same[late]] == DEGRADED), "reduced mode"
     assert not np.any(doubled.outputs["mode"][same] == FAILED)
-    straight = np.abs(sound.truth["yaw_rate"][rows][late]) < 0.1  # a swerving car magnifies any difference
-    assert straight.mean() > 0.6
-    assert np.abs(share[straight] - 1.0).max() < 0.03
+    swerves = [
+        np.abs(drive.truth["yaw_rate"][at][late]) > 0.1 for drive, at in ((sound, rows), (doubled, same))
+    ]
+    settled = np.convolve(swerves[0] | swerves[1], np.ones(SETTLED))[: len(share)] == 0.0
+    assert settled.mean() > 0.4
+    assert np.abs(share[settled] - 1.0).max() < 0.03
 
 
 def force(driven: Drive, rows: np.ndarray[Any, Any]) -> Any:

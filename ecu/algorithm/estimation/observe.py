@@ -172,7 +172,8 @@ def _observe_jointly(
         follow_ceiling(p, joint, s.guard.capped, braking)
     if joint.closed and joint.released and not p.transmit:
         compare_drive(p, s.whole, joint)
-        add_coasting(p, s.whole, joint, u)
+        if add_coasting(p, s.whole, joint, u) and not p.fixed:
+            _keep(p, s)
     if braking and joint.closed:
         if not p.transmit:
             add_to_whole(p, s.whole, joint)

@@ -231,18 +231,19 @@ def end_whole(state: Record) -> None:
 
 
 @kernel
-def add_coasting(params: Record, state: Record, joint: Record, inputs: Record) -> None:
-    """Learn the unreported drag from the last window, in which no brake was applied, if it shows it."""
+def add_coasting(params: Record, state: Record, joint: Record, inputs: Record) -> bool:
+    """Learn the unreported drag from the last window, without brakes; return whether it shows it."""
     known = usable(inputs, ACCELERATOR_POSITION)
     if not known or driver_accelerates(inputs) or requested_decel(params, inputs) > LEAST_REQUEST:
         state.coasting_s = 0.0
-        return
+        return False
     state.coasting_s += joint.window.time
     coasts = COASTS_FROM_S <= state.coasting_s <= COASTS_TO_S
     if not coasts or _windows_teach(params, joint) or not _can_be_judged(params, joint):
-        return
+        return False
     drag = -other_decel(params, joint, params.mass, torque_share(state))
     correct_by_coasting(state.filter, drag, joint.x[V], joint.window.time)
+    return True
 
 
 @kernel

@@ -13,6 +13,7 @@ import pytest
 from ecu.algorithm.estimation.joint.layout import CHANGE, JOINT_STATE, LEVEL, N
 from ecu.algorithm.estimation.joint.observer import start_joint, update_joint
 from ecu.algorithm.estimation.joint.prior import PRIOR, begin_application, end_application, set_prior
+from ecu.algorithm.estimation.joint.wheel import SHAPE
 from ecu.algorithm.estimation.motion import MOTION_STATE
 from ecu.algorithm.hydraulics import HYDRAULICS_STATE
 from ecu.contract.signals import CALLIPER_PRESSURE, MOTOR_TORQUE, VEHICLE_SPEED, WHEEL_SPEED
@@ -20,7 +21,7 @@ from ecu.contract.signals import CALLIPER_PRESSURE, MOTOR_TORQUE, VEHICLE_SPEED,
 DT = 0.01
 BAR = 1e5
 GRAVITY = 9.81
-SHAPE, PEAK = 1.6, 0.9  # Magic Formula: c, D at static load
+PEAK = 0.9  # Magic Formula: D at static load; c is the observer's: here the car is as it is configured
 NEARLY_QUIET = 1e-4  # bar; a sensor that read exactly zero at rest would pass for one that is cut off there
 
 
