@@ -18,6 +18,7 @@ BASE: Final[dict[str, dict[str, float]]] = {
     "s": {"s": 1},
     "us": {"s": 1, "factor": 1e-6},
     "bar": {"kg": 1, "m": -1, "s": -2, "factor": 1e5},
+    "W/kg": {"m": 2, "s": -3},
     "N": {"kg": 1, "m": 1, "s": -2},
     "N m": {"kg": 1, "m": 2, "s": -2},
     "K": {"K": 1},
