@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brakelab.bench.xcp_master import Master, Wire
 from brakelab.simulation.priority import PRIORITY
 from brakelab.testing.daemon import Daemon, patience, wait_for
-from brakelab.testing.xcp_master import Master, Wire
 from ecu.bus.channel import open_channel
 from ecu.bus.protocol import Channel
 from ecu.bus.transmit import contract_transmit_plan, frame_buffer, new_transmission, transmit

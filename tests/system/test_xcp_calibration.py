@@ -9,9 +9,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from brakelab.bench.xcp_master import VARIABLES, CanWire, Master, Refused
 from brakelab.replay.command import replay
 from brakelab.testing.daemon import wait_for
-from brakelab.testing.xcp_master import VARIABLES, CanWire, Master, Refused
 from ecu.bus.channel import open_bus
 from ecu.contract.records import output_vector
 from ecu.contract.signals import OUTPUT_COLUMNS

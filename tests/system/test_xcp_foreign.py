@@ -7,8 +7,8 @@ import time
 import numpy as np
 import pytest
 
+from brakelab.bench.xcp_master import VARIABLES
 from brakelab.testing.daemon import wait_for
-from brakelab.testing.xcp_master import VARIABLES
 from ecu.settings.config import load_config
 from ecu.xcp.memory import EPK
 

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from brakelab.testing.xcp_master import VARIABLES, CanWire, Master
+from brakelab.bench.xcp_master import VARIABLES, CanWire, Master
 from ecu.bus.channel import open_bus
 from ecu.recording.recorder import read_recording
 

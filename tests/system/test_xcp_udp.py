@@ -10,8 +10,8 @@ import time
 import numpy as np
 import pytest
 
+from brakelab.bench.xcp_master import VARIABLES, CanWire, Master, Refused, Wire
 from brakelab.testing.daemon import wait_for
-from brakelab.testing.xcp_master import VARIABLES, CanWire, Master, Refused, Wire
 from ecu.bus.channel import open_bus
 from ecu.contract.records import output_vector
 from ecu.contract.signals import OUTPUT_COLUMNS

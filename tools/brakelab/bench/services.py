@@ -18,8 +18,8 @@ from typing import Any, Final, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.bench.xcp_master import VARIABLES, Master, Wire
 from brakelab.rig.live import Bus
-from brakelab.testing.xcp_master import VARIABLES, Master, Wire
 from ecu.bus.addresses import parse_addresses
 from ecu.diagnostics.read_faults import BY_MASK
 from ecu.diagnostics.services import READ_FAULTS

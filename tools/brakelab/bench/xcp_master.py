@@ -4,12 +4,12 @@ import hmac
 import socket
 import struct
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final, Protocol
 
 import can
 
-from brakelab.testing.daemon import wait_for
+from ecu.errors import RunFault
 from ecu.xcp.variables import RECORDS
 
 HEADER: Final = struct.Struct("<HH")
@@ -19,8 +19,18 @@ VARIABLES: Final = {
     for one in record.variables
 }
 """Address of each variable, and the variable."""
+PATIENCE_S: Final = 60.0
 AT_ONCE: Final = 150
 """Numbers of eight bytes in a packet."""
+
+
+def wait_for(fact: Callable[[], bool]) -> None:
+    """Look again and again until `fact` holds. Raises RunFault if it does not."""
+    end = time.monotonic() + PATIENCE_S
+    while not fact():
+        if time.monotonic() > end:
+            raise RunFault("the slave of XCP does not answer")
+        time.sleep(0.01)
 
 
 class Transport(Protocol):
