@@ -44,6 +44,14 @@ def trip(delay: float = 2.0, stops: int = 10, noise: float = 0.0, holds: bool = 
     )  # fmt: skip
 
 
+def test_a_background_that_seems_to_fall_with_speed_is_their_mean():
+    fast = trip()
+    falls = fast._replace(concentration=fast.concentration - 2.0 * BY_SPEED * fast.speed)
+    found = find_background(falls, find_applications(falls))
+    assert found.by_speed == 0.0
+    assert found.levels.min() < found.still < found.levels.max()
+
+
 def test_an_application_that_was_not_counted_is_left_out():
     whole = trip()
     start = extract(whole, RADIUS).start[3]

@@ -157,7 +157,9 @@ def find_background(trip: Recorded, applications: list[tuple[int, int]]) -> Back
     if len(speeds) == 1:
         return Background(levels[0], 0.0, np.array(speeds), np.array(levels), np.ones(len(trip.t)))
     slope, still = np.polyfit(speeds, levels, 1, w=np.sqrt(counts))
-    slope, still = max(float(slope), 0.0), max(float(still), 1.0)
+    if slope < 0.0:  # it wandered more than it grew
+        slope, still = 0.0, np.average(levels, weights=counts)
+    slope, still = float(slope), max(float(still), 1.0)
     ratio = np.log(np.maximum(c, 1.0) / (still + slope * v))
     ratio = np.clip(ratio - np.median(ratio), -1.0, 1.0)
     coarse = trip.t[:: round(5.0 / PERIOD)]
