@@ -3,7 +3,7 @@
 import can
 import pytest
 
-from ecu.bus.addresses import Addresses, can_filters, parse_addresses, refuse_taken
+from ecu.bus.addresses import Addresses, can_filters, check_ipv4, parse_addresses, refuse_taken
 from ecu.contract.records import EXTENDED_ID
 from ecu.errors import UserError
 
@@ -68,3 +68,10 @@ def test_filters_let_these_identifiers_pass_alone():
         heard = [receiver.recv(timeout=0.1) for _ in range(3)]
     assert heard[2] is None
     assert [(one.arbitration_id, one.is_extended_id) for one in heard[:2]] == [sent[0], sent[3]]
+
+
+@pytest.mark.parametrize("address", ["localhost", "127.0.0", "::1", "256.0.0.1", ""])
+def test_an_address_that_is_none_of_ipv4_is_refused(address):
+    check_ipv4("--xcp", "udp:0.0.0.0:5555", "0.0.0.0")
+    with pytest.raises(UserError, match="--xcp: udp:X:5555: give an IPv4 address"):
+        check_ipv4("--xcp", "udp:X:5555", address)
