@@ -38,22 +38,25 @@ def _fifo(priority: int) -> None:
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
 
 
-def _lock_memory() -> None:
-    """Load and lock what is mapped from files, lock what was touched of the rest and what is mapped later.
+def _lock_memory(later: bool = True) -> None:
+    """Load and lock what is mapped from files, lock what was touched of the rest and what is mapped `later`.
 
     A free page of the heap is locked when it is first used: it comes from memory, never from the disk.
-    Left out: libraries that the loop never calls, buffers that nothing has touched.
+    Left out: libraries that the loop never calls, buffers that nothing has touched. Refused, nothing is
+    locked: a limit would make what is mapped later fail.
     """
     libc = ctypes.CDLL(None, use_errno=True)
-    refused = libc.mlockall(_MCL_FUTURE)
+    refused = 0
     for begin, end, rights, path, touched in _MAPPING.findall(Path("/proc/self/smaps").read_bytes()):
         if int(touched) and not any(name in os.fsdecode(path) for name in _NEVER_CALLED):
             first, last = int(begin, 16), int(end, 16)
             free = rights == b"rw-p" and not path.startswith(b"/")
             how = _MLOCK_ONFAULT if free else 0
             refused = refused or libc.mlock2(ctypes.c_void_p(first), ctypes.c_size_t(last - first), how)
+    refused = refused or (libc.mlockall(_MCL_FUTURE) if later else 0)
     if refused:
         number = ctypes.get_errno()
+        libc.munlockall()
         raise OSError(number, os.strerror(number))
 
 
@@ -116,7 +119,7 @@ def freeze_memory() -> None:
     gc.freeze()
     gc.disable()
     with suppress(OSError, AttributeError):  # `make_realtime` asks again and judges
-        _lock_memory()
+        _lock_memory(False)
 
 
 def make_realtime(cpu: int | None = None, priority: int = PRIORITY) -> list[Verdict]:

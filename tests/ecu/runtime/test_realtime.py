@@ -98,6 +98,25 @@ def test_what_the_loop_never_calls_and_what_nothing_touched_is_not_locked():
     assert int(resident) < 100_000
 
 
+LIMITED = """
+import mmap, os, resource
+from ecu.runtime.realtime import make_realtime
+
+resource.setrlimit(resource.RLIMIT_MEMLOCK, (1 << 20, 1 << 20))
+os.setuid(65534)
+print({verdict.name: verdict.granted for verdict in make_realtime()}["mlockall"])
+mmap.mmap(-1, 1 << 25)
+"""
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root may become somebody else")
+def test_a_user_who_may_not_lock_memory_can_map_it(tmp_path):
+    """Locked later, what is mapped would fail beyond the limit: the daemon's ring."""
+    asked = [sys.executable, "-c", LIMITED]
+    out = subprocess.run(asked, capture_output=True, text=True, timeout=60, check=True)
+    assert out.stdout.endswith("False\n")
+
+
 def test_a_daemon_sees_the_others_of_its_user(monkeypatch, tmp_path):
     monkeypatch.setattr(ring_module, "ring_folder", lambda: tmp_path)
     rings = [ring_module.create_ring(ring_path(n), {}, b"", slots=2, frames=1) for n in (7, os.getpid())]
