@@ -9,41 +9,31 @@ OLDEST_S = 30.0
 
 
 @kernel
-def save_snapshot(state: Record, row: int) -> None:
-    """Save the present state and covariance over snapshot `row`."""
+def _copy(x: Record, p: Record, to_x: Record, to_p: Record) -> None:
     for i in range(N):
-        state.kept_x[row, i] = state.x[i]
+        to_x[i] = x[i]
         for j in range(N):
-            state.kept_p[row, i, j] = state.p[i, j]
+            to_p[i, j] = p[i, j]
 
 
 @kernel
-def _copy(state: Record, row: int, to: int) -> None:
-    for i in range(N):
-        state.kept_x[to, i] = state.kept_x[row, i]
-        for j in range(N):
-            state.kept_p[to, i, j] = state.kept_p[row, i, j]
+def save_snapshot(state: Record, row: int) -> None:
+    """Save the present state and covariance over snapshot `row`."""
+    _copy(state.x, state.p, state.kept_x[row], state.kept_p[row])
 
 
 @kernel
 def keep_calm_snapshot(state: Record) -> None:
     """Keep the older snapshot: all inputs agree."""
     state.calm_s = 0.0
-    for i in range(N):
-        state.calm_x[i] = state.kept_x[1, i]
-        for j in range(N):
-            state.calm_p[i, j] = state.kept_p[1, i, j]
+    _copy(state.kept_x[1], state.kept_p[1], state.calm_x, state.calm_p)
 
 
 @kernel
 def take_calm_snapshot(state: Record) -> None:
     """Make it the older snapshot, which is restored next, unless the linings may have changed since."""
-    if state.calm_s > OLDEST_S:
-        return
-    for i in range(N):
-        state.kept_x[1, i] = state.calm_x[i]
-        for j in range(N):
-            state.kept_p[1, i, j] = state.calm_p[i, j]
+    if state.calm_s <= OLDEST_S:
+        _copy(state.calm_x, state.calm_p, state.kept_x[1], state.kept_p[1])
 
 
 @kernel
@@ -55,7 +45,7 @@ def restore_snapshot(state: Record) -> None:
         for j in range(N):
             state.p[i, j] = state.kept_p[1, i, j]
     forget_speed(state)
-    _copy(state, 1, 0)
+    _copy(state.kept_x[1], state.kept_p[1], state.kept_x[0], state.kept_p[0])
     state.kept_s = 0.0
 
 
@@ -70,6 +60,6 @@ def save_snapshots(state: Record) -> None:
 @kernel
 def save_newer_snapshot(state: Record) -> None:
     """Make the newer snapshot the older one and save a new one."""
-    _copy(state, 0, 1)
+    _copy(state.kept_x[0], state.kept_p[0], state.kept_x[1], state.kept_p[1])
     save_snapshot(state, 0)
     state.kept_s = 0.0
