@@ -37,7 +37,6 @@ PARTICLES: Final = TRUTH_COLUMNS.index("particles_fl")
 BRAKING, LAST = OUTPUT["braking"], OUTPUT["particles_last_brake"]
 MEASURED_AT: Final = 10e6  # m
 LATER: Final = 20  # rows, latest report of an application after it began
-SPREADS: Final = (DAY, APPLICATION)
 QUIET: Final = (0.03, 0.15)
 """Standard deviations of the logarithm, of a day and of an application, of brakes that repeat better."""
 
@@ -114,7 +113,8 @@ def _while_counted(trip: Trip, so_far: Array) -> float:
 
 def draw_trips(seed: int, quiet: bool = False, vapour: bool = False) -> Draw:
     """Return the models' results for the trips of a seed; `vapour`: the second form of the law emits."""
-    made = campaign(seed, *(QUIET if quiet else SPREADS), car=drawn_brake(seed, vapour))
+    day, application = QUIET if quiet else (DAY, APPLICATION)
+    made = campaign(seed, day, application, car=drawn_brake(seed, vapour))
     trips = _applications(made)
     trained, test = trips[:-1], trips[-1:]
     judged = judge_all(trained, test, seed)
