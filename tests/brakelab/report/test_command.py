@@ -33,6 +33,14 @@ def cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-100])
 
 
+def spoil(path: Path) -> None:
+    """Write zeros over the pages, before what says where they are."""
+    size = path.stat().st_size
+    with path.open("r+b") as file:
+        file.seek(4)
+        file.write(bytes(size // 2))
+
+
 def written(files: Files, truth: bool = True, timing: bool = True) -> str:
     out = files["result"].with_name("new") / "report.html"
     report(files["result"], files["truth"] if truth else None, out, files["timing"] if timing else None)
@@ -177,6 +185,7 @@ def test_truth_is_shifted_by_the_dates_of_the_first_rows(drive_files: Files, pag
         ("result", lambda path: change(path, lambda t: t.slice(0, 0)), r"0 rows"),
         ("result", lambda path: change(path, column("t", np.zeros(6000))), r"column t, row 1: time must"),
         ("result", lambda path: change(path, column("mu_b_fl", ["x"] * 6000)), r"mu_b_fl: holds string"),
+        ("result", spoil, r"stops\.parquet: not a readable Parquet file"),
         ("truth", lambda path: path.unlink(), r"stops\.truth\.parquet: no such file: give the NAME"),
         ("truth", lambda path: change(path, lambda t: t.drop_columns("mu_b_fr")), r"column mu_b_fr: missing"),
         ("truth", lambda path: change(path, column("t", 1e4 + np.arange(6000.0))), r"the truth of the same"),

@@ -48,10 +48,11 @@ def evaluated(drive: DriveResult, truth: DriveResult | None, found: list[Braking
     rows = np.zeros(len(drive.t), bool)
     for braking in found:
         within = inside(drive, braking)
-        reached = np.flatnonzero(within & (demand > 0.0) & (achieved >= REACHED * demand))
+        t, asked = drive.t[within], demand[within]
+        reached = np.flatnonzero((asked > 0.0) & (achieved[within] >= REACHED * asked))
         if reached.size:
-            settled = drive.t >= drive.t[reached[0]] + SETTLING_S
-            rows |= within & settled & (demand > 0.0) & (speed >= LOWEST_SPEED)
+            settled = t >= t[reached[0]] + SETTLING_S
+            rows[within] |= settled & (asked > 0.0) & (speed[within] >= LOWEST_SPEED)
     return rows
 
 
@@ -68,8 +69,9 @@ def tracking(drive: DriveResult, truth: DriveResult | None, found: list[Braking]
     )
     shares = []
     for braking in found:
-        mine = rows & inside(drive, braking)
-        known = mine.any() and not (motors - asked)[mine].sum() > MOTORS * brakes[mine].sum() > 0.0
+        within = inside(drive, braking)
+        mine = within.start + np.flatnonzero(rows[within])
+        known = mine.size and not (motors - asked)[mine].sum() > MOTORS * brakes[mine].sum() > 0.0
         shares.append(float(achieved[mine].sum() / demand[mine].sum()) - 1.0 if known else float("nan"))
     return shares
 

@@ -64,11 +64,11 @@ def observed(drive: DriveResult, found: list[Braking]) -> dict[str, list[Observe
     by_axle = {}
     for axle, wheels in AXLES.items():
         friction, pressure = _friction(drive, wheels), axle_pressure(drive, wheels)
+        known = np.isfinite(friction) & np.isfinite(pressure) & (speed > LEAST_SPEED)
         rows = []
         for braking in found:
-            places = np.flatnonzero(
-                inside(drive, braking) & np.isfinite(friction) & np.isfinite(pressure) & (speed > LEAST_SPEED)
-            )
+            within = inside(drive, braking)
+            places = within.start + np.flatnonzero(known[within])
             if len(places) * period < LEAST_SECONDS:
                 continue
             mu = friction[places]

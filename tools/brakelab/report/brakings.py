@@ -84,16 +84,17 @@ def brakings(drive: DriveResult, result: Path) -> list[Braking]:
     return [braking._replace(number=number) for number, braking in enumerate(lasting, 1)]
 
 
-def inside(drive: DriveResult, braking: Braking) -> NDArray[np.bool_]:
-    """Return the rows of the brake application, shape (n,)."""
-    return np.asarray((drive.t >= braking.t_start) & (drive.t <= braking.t_end))
+def inside(drive: DriveResult, braking: Braking, before: float = 0.0) -> slice:
+    """Return the rows of the brake application and of `before` [s] ahead of it."""
+    first = np.searchsorted(drive.t, braking.t_start - before)
+    return slice(int(first), int(np.searchsorted(drive.t, braking.t_end, "right")))
 
 
 def inside_any(drive: DriveResult, found: list[Braking]) -> NDArray[np.bool_]:
     """Return the rows of all brake applications, shape (n,)."""
     rows = np.zeros(len(drive.t), bool)
     for braking in found:
-        rows |= inside(drive, braking)
+        rows[inside(drive, braking)] = True
     return rows
 
 
@@ -127,7 +128,7 @@ def _from_file(drive: DriveResult, path: Path) -> list[Braking]:
     per_corner = [optional(name) for name in ("sigma_mu_b_end", "mu_b_before", "sigma_mu_b_before")]
     forces = [optional(name) for name in _OF_FORCE]
     reasons = table.column("left_out").to_pylist() if "left_out" in table.column_names else None
-    found = []
+    demand, found = _demand(drive), []
     for number in np.unique(brake):
         rows = np.flatnonzero(brake == number)
         place = {str(corner[row]): row for row in rows}
@@ -144,7 +145,7 @@ def _from_file(drive: DriveResult, path: Path) -> list[Braking]:
             per_corner[1][order], per_corner[2][order],
             str(reasons[order[0]] or "") if reasons else left_out(duration, achieved, predicted),
         )  # fmt: skip
-        found.append(braking._replace(demanded=mean_known(_demand(drive)[inside(drive, braking)])))
+        found.append(braking._replace(demanded=mean_known(demand[inside(drive, braking)])))
     return found
 
 
@@ -154,7 +155,7 @@ def _from_result(drive: DriveResult) -> list[Braking]:
     friction, sigma = drive.corners("mu_b"), drive.corners("sigma_mu_b")
     temperature = drive.corners("disc_temperature")
     speed = drive.column("vehicle_speed")
-    found = []
+    demand, found = _demand(drive), []
     for first, end in stretches(busy):
         last = end - 1
         duration = max(float(drive.t[last] - drive.t[first]), PERIOD)
@@ -165,7 +166,7 @@ def _from_result(drive: DriveResult) -> list[Braking]:
                 t_end=float(drive.t[last]),
                 v_in=float(speed[first]),
                 v_end=float(speed[last]),
-                demanded=mean_known(_demand(drive)[first:end]),
+                demanded=mean_known(demand[first:end]),
                 achieved=float(speed[first] - speed[last]) / duration,
                 predicted=float("nan"),
                 friction=friction[min(end, len(friction) - 1)],

@@ -1,6 +1,7 @@
 """Downsampling that preserves appearance: each bucket keeps its extremes, in their order."""
 
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,3 +63,9 @@ def extremes(grid: Buckets, values: Vector) -> Vector:
 def worst(grid: Buckets, levels: Vector) -> Vector:
     """Return the largest value of each bucket, of a mode the most severe one, shape (buckets,)."""
     return np.asarray(np.fmax.reduceat(levels, grid.first))
+
+
+def drawn(grid: Buckets, t: Vector, lines: Iterable[tuple[str, Vector]]) -> dict[str, NDArray[Any]]:
+    """Return `t` and the lines with at least one number at the points that are drawn."""
+    points = {name: extremes(grid, line).astype("f4") for name, line in lines if np.isfinite(line).any()}
+    return {"t": times(grid, t), **points}

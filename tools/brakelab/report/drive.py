@@ -1,8 +1,9 @@
 """Drive as read by the report: columns over one time axis from Parquet, with the truth mapped onto it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -12,6 +13,34 @@ from brakelab.arrays import Vector
 from brakelab.results.files import refuse_export
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
+
+KEPT: Final = 128 << 20  # bytes of columns
+
+
+class Columns(Mapping[str, Vector]):
+    """Columns, all of one length, that `read` makes when asked for; the last `KEPT` bytes are kept."""
+
+    def __init__(self, names: Iterable[str], read: Callable[[str], Vector]) -> None:
+        self._names, self._read = dict.fromkeys(names), read
+        self._kept: dict[str, Vector] = {}
+
+    def __getitem__(self, name: str) -> Vector:
+        if name not in self._names:
+            raise KeyError(name)
+        values = self._kept.pop(name, None)
+        self._kept[name] = values = self._read(name) if values is None else values
+        while len(self._kept) > 1 and len(self._kept) * values.nbytes > KEPT:
+            del self._kept[next(iter(self._kept))]
+        return values
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
 
 
 class DriveResult(NamedTuple):
@@ -35,14 +64,25 @@ class DriveResult(NamedTuple):
         """Return the four columns of a corner quantity, shape (n, 4)."""
         return np.column_stack([self.column(f"{stem}_{corner}") for corner in CORNERS])
 
+    def without(self, names: set[str]) -> "DriveResult":
+        """Return the drive without some columns."""
+        left = [name for name in self.columns if name not in names]
+        return self._replace(columns=Columns(left, self.columns.__getitem__))
+
 
 def read_parquet(path: Path, remedy: str) -> pa.Table:
     """Return the table; UserError with `remedy` when there is none or it cannot be read."""
+    with _readable(path, remedy):
+        return pq.read_table(path)
+
+
+@contextmanager
+def _readable(path: Path, remedy: str) -> Iterator[None]:
     refuse_export(path)
     if not path.is_file():
         raise UserError(str(path), "no such file", remedy)
     try:
-        return pq.read_table(path)
+        yield
     except (pa.ArrowException, OSError, ValueError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise UserError(str(path), f"not a readable Parquet file ({reason})", remedy) from error
@@ -63,20 +103,27 @@ def read_drive(path: Path, required: tuple[str, ...], remedy: str) -> DriveResul
     Raises UserError when the file is missing or damaged, lacks `t` or a required column, is empty, or
     when `t` does not increase.
     """
-    table = read_parquet(path, remedy)
+    with _readable(path, remedy):
+        file = pq.ParquetFile(path)
     for name in ("t", *required):
-        if name not in table.column_names:
+        if name not in file.schema_arrow.names:
             raise UserError(str(path), f"column {name}: missing", remedy)
-    if table.num_rows < 2:
-        raise UserError(str(path), f"{table.num_rows} rows", remedy)
-    t = numbers(table, "t", path)
+    if file.metadata.num_rows < 2:
+        raise UserError(str(path), f"{file.metadata.num_rows} rows", remedy)
+
+    def read(name: str) -> Vector:
+        with _readable(path, remedy):
+            table = file.read([name])
+        return numbers(table, name, path)
+
+    t = read("t")
     wrong = np.flatnonzero(~(np.diff(t) > 0.0))
     if wrong.size or not np.isfinite(t).all():
         row = int(wrong[0]) + 1 if wrong.size else 0
         raise UserError(str(path), f"column t, row {row}", "time must be finite and increase from row to row")
     numeric = [
         field.name
-        for field in table.schema
+        for field in file.schema_arrow
         if field.name in required
         or pa.types.is_integer(field.type)
         or pa.types.is_floating(field.type)
@@ -84,9 +131,12 @@ def read_drive(path: Path, required: tuple[str, ...], remedy: str) -> DriveResul
     ]
     metadata = {
         key.decode(errors="replace"): value.decode(errors="replace")
-        for key, value in (pq.read_metadata(path).metadata or {}).items()
+        for key, value in (file.metadata.metadata or {}).items()
     }
-    return DriveResult(t, {name: numbers(table, name, path) for name in numeric if name != "t"}, metadata)
+    columns = Columns((name for name in numeric if name != "t"), read)
+    for name in required:
+        columns[name]
+    return DriveResult(t, columns, metadata)
 
 
 def start_ns(drive: DriveResult) -> int | None:
@@ -110,8 +160,8 @@ def onto(drive: DriveResult, truth: DriveResult, truth_path: Path) -> DriveResul
         span = f"{drive.t[0]:.1f} to {drive.t[-1]:.1f} s"
         remedy = f"the result covers {span}; give the truth of the same drive"
         raise UserError(str(truth_path), f"time {t[0]:.1f} to {t[-1]:.1f} s", remedy)
-    columns = {
-        name: np.interp(drive.t, t, values, left=np.nan, right=np.nan)
-        for name, values in truth.columns.items()
-    }
-    return DriveResult(drive.t, columns, truth.metadata)
+
+    def mapped(name: str) -> Vector:
+        return np.interp(drive.t, t, truth.columns[name], left=np.nan, right=np.nan)
+
+    return DriveResult(drive.t, Columns(truth.columns, mapped), truth.metadata)

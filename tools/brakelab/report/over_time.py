@@ -1,5 +1,6 @@
 """Linked plots over a drive: speed, deceleration, friction, pressures, discs, K_f and modes."""
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,7 +9,7 @@ from bokeh.models.annotations import BoxAnnotation
 
 from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, inside_any
-from brakelab.report.downsample import Buckets, buckets, extremes, times
+from brakelab.report.downsample import Buckets, buckets, drawn
 from brakelab.report.drive import DriveResult
 from brakelab.report.look import (
     DEMAND,
@@ -51,10 +52,7 @@ _DISC = _Estimated("disc_temperature", "0", 40.0)
 def plots_over_time(drive: DriveResult, truth: DriveResult | None, found: list[Braking]) -> dict[str, Any]:
     """Return the figures by name in reading order; all share the x range `drive-time` and one source."""
     grid = buckets(inside_any(drive, found), POINTS)
-    lines = _lines(drive, truth)
-    source = ColumnDataSource(
-        {"t": times(grid, drive.t), **{name: extremes(grid, v).astype("f4") for name, v in lines.items()}}
-    )
+    source = ColumnDataSource(drawn(grid, drive.t, _lines(drive, truth)))
     span = Range1d(start=float(drive.t[0]), end=float(drive.t[-1]), name="drive-time", bounds="auto")
     plots = {
         "speed": _speed(source, span),
@@ -86,31 +84,28 @@ def _coarse(grid: Buckets) -> Buckets:
     return Buckets(grid.first[::2], last)
 
 
-def _lines(drive: DriveResult, truth: DriveResult | None) -> dict[str, Vector]:
-    """Return every quantity with at least one number, in the units of the plots."""
-    lines = {
-        "speed": drive.column("vehicle_speed") * KMH,
-        "demanded": drive.column("decel_demand_total"),
-        "achieved": -drive.column("accel_x_road"),
-        "k_f": drive.column("k_f"),
-        "grip_limit": drive.column("grip_limit"),
-    }
+def _lines(drive: DriveResult, truth: DriveResult | None) -> Iterator[tuple[str, Vector]]:
+    """Yield every quantity in the units of the plots."""
+    yield "speed", drive.column("vehicle_speed") * KMH
+    yield "demanded", drive.column("decel_demand_total")
+    yield "achieved", -drive.column("accel_x_road")
+    yield "k_f", drive.column("k_f")
+    yield "grip_limit", drive.column("grip_limit")
     for corner in ("fl", "fr", "rl", "rr"):
         for name in (_FRICTION.column, _DISC.column):
             value, sigma = drive.column(f"{name}_{corner}"), drive.column(f"sigma_{name}_{corner}")
-            lines[f"{name}_{corner}"] = value
-            lines[f"{name}_low_{corner}"] = value - 2.0 * sigma
-            lines[f"{name}_high_{corner}"] = value + 2.0 * sigma
-        lines[f"pressure_{corner}"] = drive.column(f"calliper_pressure_{corner}")
-        lines[f"demand_{corner}"] = drive.column(f"pressure_demand_{corner}")
+            yield f"{name}_{corner}", value
+            yield f"{name}_low_{corner}", value - 2.0 * sigma
+            yield f"{name}_high_{corner}", value + 2.0 * sigma
+        yield f"pressure_{corner}", drive.column(f"calliper_pressure_{corner}")
+        yield f"demand_{corner}", drive.column(f"pressure_demand_{corner}")
     if truth is not None:
-        lines["speed_true"] = truth.column("vehicle_speed") * KMH
-        lines["achieved_true"] = -truth.column("accel_x_road")
-        lines["k_f_true"] = truth.column("k_f")
+        yield "speed_true", truth.column("vehicle_speed") * KMH
+        yield "achieved_true", -truth.column("accel_x_road")
+        yield "k_f_true", truth.column("k_f")
         for corner in ("fl", "fr", "rl", "rr"):
             for name in (_FRICTION.column, _DISC.column):
-                lines[f"{name}_true_{corner}"] = truth.column(f"{name}_{corner}")
-    return {name: values for name, values in lines.items() if np.isfinite(values).any()}
+                yield f"{name}_true_{corner}", truth.column(f"{name}_{corner}")
 
 
 def _hover(plot: Any, source: ColumnDataSource, rows: list[tuple[str, str, str]]) -> None:

@@ -182,5 +182,4 @@ def drop_placeholders(drive: DriveResult, without_pressure: bool) -> DriveResult
     """
     nothing = ["mu_b", "sigma_mu_b", "calliper_pressure", "brake_torque"] if without_pressure else []
     nothing += [] if drive.has("decel_demand_total") else ["pressure_demand"]
-    left_out = {f"{stem}_{corner}" for stem in nothing for corner in CORNERS}
-    return drive._replace(columns={k: v for k, v in drive.columns.items() if k not in left_out})
+    return drive.without({f"{stem}_{corner}" for stem in nothing for corner in CORNERS})

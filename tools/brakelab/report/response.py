@@ -92,7 +92,7 @@ def responses(drive: DriveResult, found: list[Braking]) -> list[Response]:
         friction = np.where(modes == OBSERVING, friction, np.nan)
     rows = []
     for braking in found:
-        early = (drive.t >= braking.t_start - BEFORE) & (drive.t <= braking.t_end)
+        early = inside(drive, braking, BEFORE)
         within = inside(drive, braking)
         built = [build_up(drive.t[early], pressure[early]) for pressure in measured]
         asked = [build_up(drive.t[early], pressure[early]) for pressure in demanded]

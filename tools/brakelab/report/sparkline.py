@@ -1,13 +1,11 @@
 """Sparklines: demanded and achieved deceleration as SVG, of each brake application or of a whole drive."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, inside
 from brakelab.report.drive import DriveResult
 
-Rows = NDArray[np.bool_]
 Curve = tuple[Vector, Vector]
 """Positions as shares of the time, and means [m/s^2]."""
 
@@ -26,11 +24,11 @@ def sparklines(drive: DriveResult, found: list[Braking]) -> list[str]:
 
 def drive_sparkline(drive: DriveResult) -> str:
     """Return an SVG of a whole drive, empty without data."""
-    pair = _pair(drive, np.ones(len(drive.t), np.bool_), DRIVE_POINTS)
+    pair = _pair(drive, slice(None), DRIVE_POINTS)
     return _svg(pair, _scale([pair]), DRIVE_WIDTH)
 
 
-def _pair(drive: DriveResult, rows: Rows, points: int) -> list[Curve]:
+def _pair(drive: DriveResult, rows: slice, points: int) -> list[Curve]:
     decelerations = drive.column("decel_demand_total"), -drive.column("accel_x_road")
     return [_means(drive.t[rows], values[rows], points) for values in decelerations]
 

@@ -72,8 +72,8 @@ def reference_of(drive: DriveResult, car: Car, found: list[Braking]) -> Referenc
     counts = (decel >= RANGE[0]) & (decel <= RANGE[1])
     dt = float(np.median(np.diff(drive.t)))
     held = max(round(HELD_S / dt), 1)
-    stretches = [np.flatnonzero(inside(drive, one)) for one in found]
-    stretches = [rows for rows in stretches if len(rows) * dt >= LEAST_S]
+    stretches = [inside(drive, one) for one in found]
+    stretches = [rows for rows in stretches if (rows.stop - rows.start) * dt >= LEAST_S]
     friction = np.full_like(torque, np.nan)
     factors = {}
     for (axle, wheels), gain, push_out in zip(AXLES.items(), car.gain, car.push_out, strict=True):

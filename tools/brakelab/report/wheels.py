@@ -1,12 +1,13 @@
 """Linked plots over a drive: slip and speeds of the wheels, torques, pedals, what the car does across."""
 
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
 from bokeh.models import ColumnDataSource, Range1d
 
 from brakelab.arrays import Vector
-from brakelab.report.downsample import Buckets, extremes, times
+from brakelab.report.downsample import Buckets, drawn
 from brakelab.report.drive import DriveResult
 from brakelab.report.look import (
     DEMAND,
@@ -54,10 +55,7 @@ def plots_of_wheels(
     drive: DriveResult, truth: DriveResult | None, grid: Buckets, span: Range1d
 ) -> dict[str, Any]:
     """Return the figures by name in reading order, all over the range `span`; those without a line, too."""
-    lines = {name: v for name, v in _lines(drive, truth).items() if np.isfinite(v).any()}
-    source = ColumnDataSource(
-        {"t": times(grid, drive.t), **{name: extremes(grid, v).astype("f4") for name, v in lines.items()}}
-    )
+    source = ColumnDataSource(drawn(grid, drive.t, _lines(drive, truth)))
     return {
         "slip-front": _slip(source, span, "front", ("fl", "fr")),
         "slip-rear": _slip(source, span, "rear", ("rl", "rr")),
@@ -83,35 +81,38 @@ def motors_share(drive: DriveResult) -> Vector:
     return np.where(brakes_now, 100.0 * motors / np.maximum(both, LEAST_TORQUE), np.nan)
 
 
-def _lines(drive: DriveResult, truth: DriveResult | None) -> dict[str, Vector]:
+def _lines(drive: DriveResult, truth: DriveResult | None) -> Iterator[tuple[str, Vector]]:
     speed = 3.6 * np.abs(drive.column("vehicle_speed"))
-    lines = {"speed": speed}
+    yield "speed", speed
     for corner in CORNERS:
         slip = drive.column(f"slip_{corner}")
-        lines[f"slip_{corner}"] = 100.0 * slip
-        lines[f"speed_{corner}"] = road_speed(drive.column(f"wheel_speed_{corner}"), speed * (1.0 + slip))
+        yield f"slip_{corner}", 100.0 * slip
+        yield f"speed_{corner}", road_speed(drive.column(f"wheel_speed_{corner}"), speed * (1.0 + slip))
         if truth is not None:
             # Standing and creeping wheels slip by anything; the ECU reports none there.
-            true = np.where(np.isfinite(slip), truth.column(f"slip_{corner}"), np.nan)
-            lines[f"slip_true_{corner}"] = 100.0 * true
+            yield (
+                f"slip_true_{corner}",
+                100.0 * np.where(np.isfinite(slip), truth.column(f"slip_{corner}"), np.nan),
+            )
     motors = drive.corners("motor_torque")
     if np.isfinite(motors).any() and (motors != 0.0).any():
         for axle, wheels in (("front", slice(0, 2)), ("rear", slice(2, 4))):
             if np.nan_to_num(motors[:, wheels]).any():
-                lines[f"motors_{axle}"] = motors[:, wheels].sum(axis=1)
-        lines["share"] = motors_share(drive)
-        lines["brakes"] = drive.corners("brake_torque").sum(axis=1)
-    lines |= {name: drive.column(name) for name in ("accel_y", "yaw_rate", "steering_angle")}
+                yield f"motors_{axle}", motors[:, wheels].sum(axis=1)
+        yield "share", motors_share(drive)
+        yield "brakes", drive.corners("brake_torque").sum(axis=1)
+    for name in ("accel_y", "yaw_rate", "steering_angle"):
+        yield name, drive.column(name)
     if truth is not None:
-        lines |= {f"{name}_true": truth.column(name) for name in ("accel_y", "yaw_rate")}
+        for name in ("accel_y", "yaw_rate"):
+            yield f"{name}_true", truth.column(name)
     pedal = drive if drive.has("pedal_position") or truth is None else truth
     for name, values in (
         ("pedal", pedal.column("pedal_position")),
         ("accelerator", drive.column("accelerator_position")),
     ):
         if np.nan_to_num(values).any():
-            lines[name] = values
-    return lines
+            yield name, values
 
 
 def road_speed(turned: Vector, by_slip: Vector) -> Vector:

@@ -1,0 +1,31 @@
+"""Columns of a drive, read when they are asked for."""
+
+import numpy as np
+import pytest
+
+from brakelab.report import drive as module
+from brakelab.report.drive import Columns, DriveResult
+
+ROWS = 100
+
+
+@pytest.mark.parametrize(
+    ("kept", "asked", "read"),
+    [(2, "aab", "ab"), (2, "abcab", "abcab"), (2, "abacb", "abcb"), (3, "abcabc", "abc"), (0, "aaba", "aba")],
+)
+def test_the_last_columns_are_kept(monkeypatch: pytest.MonkeyPatch, kept: int, asked: str, read: str) -> None:
+    monkeypatch.setattr(module, "KEPT", kept * 8 * ROWS)
+    reads = []
+
+    def column(name: str) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        reads.append(name)
+        return np.full(ROWS, float(ord(name)))
+
+    columns = Columns("abc", column)
+    assert [columns[name][0] for name in asked] == [ord(name) for name in asked]
+    assert "".join(reads) == read
+
+
+def test_a_drive_without_columns_holds_no_number_of_them() -> None:
+    drive = DriveResult(np.arange(3.0), {"a": np.ones(3), "b": np.ones(3)}, {}).without({"a"})
+    assert (drive.has("a"), drive.has("b"), list(drive.columns)) == (False, True, ["b"])
