@@ -3,9 +3,13 @@
 import warnings
 from pathlib import Path
 
+import numpy as np
+import pytest
+
 from brakelab.logs.formats import read_frames
 from brakelab.logs.log_quality import LogQuality
-from brakelab.mapping.series import read_series
+from brakelab.mapping import series as module
+from brakelab.mapping.series import read_series, the_first
 from ecu.bus.database import load_database
 
 DBC = """VERSION ""
@@ -28,3 +32,13 @@ def test_a_signal_that_the_multiplexer_never_selects_has_no_series(tmp_path: Pat
         series = read_series(read_frames(log, interfaces, LogQuality()), load_database(tmp_path / "car.dbc"))
     assert [one.signal for one in series] == ["Page", "Speed"]
     assert series[1].value[:3].tolist() == [0.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize(("most", "read", "said"), [(10, 1, True), (11, 2, True), (30, 3, False)])
+def test_of_a_long_log_the_first_blocks_are_read(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], most: int, read: int, said: bool
+) -> None:
+    monkeypatch.setattr(module, "MOST_NUMBERS", most)
+    blocks = [np.full(10, k) for k in range(3)]
+    assert [int(block[0]) for block in the_first(blocks, len)] == list(range(read))
+    assert ("the log is long" in capsys.readouterr().err) is said

@@ -16,7 +16,7 @@ from brakelab.logs.signal_file import check_seconds
 from brakelab.mapping.map_text import input_lines, needs_radius, radius_line
 from brakelab.mapping.motion import Found
 from brakelab.mapping.names import converts
-from brakelab.mapping.series import FEWEST_FRAMES, Series
+from brakelab.mapping.series import FEWEST_FRAMES, Series, the_first
 from ecu.errors import UserError
 
 FLAG: Final = {0.0, 1.0}
@@ -32,10 +32,11 @@ def read_column_series(log: Path, quality: SignalQuality) -> tuple[Columns, list
     time, seconds = time_of(log, columns)
     names = [name for name in columns.names if name != time]
     parts: dict[str, list[Vector]] = {name: [] for name in [time, *names]}
-    for batch, _ in rows_of(log, columns, [time, *names], quality):
+    batches = rows_of(log, columns, [time, *names], quality)
+    for batch, _ in the_first(batches, lambda one: len(parts) * one.rows.num_rows):
         for name, values in parts.items():
             values.append(_numbers(batch.column(name)))
-    read = {name: np.concatenate(values) if values else np.empty(0) for name, values in parts.items()}
+    read = {name: np.concatenate(parts.pop(name) or [np.empty(0)]) for name in [*parts]}
     t = read[time] * seconds
     if not np.isfinite(t).any():
         raise UserError(str(log), time, "holds no time; give a file with rows")
@@ -61,11 +62,12 @@ def _numbers(column: "pa.Array[Any]") -> Vector:
 
 def _series(name: str, unit: str, t: Vector, value: Vector) -> Series:
     known = np.isfinite(t) & np.isfinite(value)
-    times, first = np.unique(t[known], return_index=True)
-    values = value[known][first]
-    period = float(np.median(np.diff(times))) if len(times) > 1 else np.nan
-    flag = set(np.unique(values[:1000]).tolist()) <= FLAG and not converts(unit, "m/s")
-    return Series("", name, unit, 0, period, flag, times, values)
+    if not known.all() or not (np.diff(t) > 0.0).all():
+        t, first = np.unique(t[known], return_index=True)
+        value = value[known][first]
+    period = float(np.median(np.diff(t))) if len(t) > 1 else np.nan
+    flag = set(np.unique(value[:1000]).tolist()) <= FLAG and not converts(unit, "m/s")
+    return Series("", name, unit, 0, period, flag, t, value)
 
 
 def column_map_text(

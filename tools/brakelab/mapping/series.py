@@ -1,8 +1,8 @@
 """Every signal of a log that its database knows, as a series over time."""
 
 import math
-from collections.abc import Iterable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from cantools.database import Database, Message
@@ -14,12 +14,27 @@ from ecu.bus.plan import compile_message, decode
 from ecu.bus.units import spelled
 from ecu.contract.records import EXTENDED_ID, FRAME_ERROR, FRAME_EXTENDED, FRAME_REMOTE, RecordArray
 from ecu.jit import kernel
+from ecu.output import say
 
 FEWEST_FRAMES = 20  # frames of a message
+MOST_NUMBERS = 20_000_000  # of a log that are looked at, within 1 GB of memory
+PER_FRAME = 5
 MAGNITUDES = {"deg", "rad", "deg/s", "rad/s", "m/s^2", "g", "N m"}  # units of what has two sides
+T = TypeVar("T")
 TURNS = 4  # of a sign, in a drive
 NOISE = 0.01  # of a signal's spread, of a usual sensor: Table 4.1 has 0.1 rad/s and 0.01 m/s^2
 ZERO = 0.05  # of the largest value, that a magnitude is below where its sign turns
+
+
+def the_first(blocks: Iterable[T], numbers: Callable[[T], int]) -> Iterator[T]:
+    """Yield the first blocks of a log, up to `MOST_NUMBERS`, and say so where there are more."""
+    left = MOST_NUMBERS
+    for block in blocks:
+        if left <= 0:
+            say("the log is long: its first part is looked at; `map check` reads all of it")
+            return
+        left -= numbers(block)
+        yield block
 
 
 class Series(NamedTuple):
@@ -95,9 +110,10 @@ def _readable(message: Message) -> bool:
 def read_series(blocks: Iterable[RecordArray], database: Database) -> list[Series]:
     """Return the series of all messages that came at least `FEWEST_FRAMES` times, on each bus for itself.
 
-    `blocks`: FRAME in the order of the log. Frames of a wrong length are left out.
+    `blocks`: FRAME in the order of the log, of a long one the first. Frames of a wrong length are left out.
     """
-    frames = np.concatenate([np.asarray(block).copy() for block in blocks])
+    first = the_first(blocks, lambda block: PER_FRAME * len(block))
+    frames = np.concatenate([np.asarray(block).copy() for block in first])
     frames = frames[frames["flags"] & (FRAME_ERROR | FRAME_REMOTE) == 0]
     extended = np.where(frames["flags"] & FRAME_EXTENDED, EXTENDED_ID, 0).astype(np.uint32)
     ids = frames["can_id"] | extended
