@@ -146,7 +146,7 @@ def test_a_map_is_taken_by_name(tmp_path: Path) -> None:
         (lambda: load("no.log"), "no.log: no such file"),
         (lambda: replay(MUSTANG, config="nosuch"), "nosuch: no such file, and none that is shipped"),
         (lambda: replay(MUSTANG, config="suv"), "give the signal map of this car"),
-        (lambda: open_result("no.parquet"), "no.parquet: no such file; give a result"),
+        (lambda: open_result("no.parquet"), "no.parquet: no such file: give a result"),
         (lambda: load(Table({}, {})), "table: columns: column t is missing"),
         (lambda: replay(5, config="suv"), "log: int: is neither a log nor a table"),
         (lambda: replay([], config="suv"), "logs: the list is empty"),

@@ -36,7 +36,8 @@ from brakelab.replay.source import load_source
 from brakelab.report.brakings_table import notebook
 from brakelab.report.command import report as write_report
 from brakelab.report.drive import DriveResult
-from brakelab.results.files import EXPORTS, brakes_path, read_result
+from brakelab.results.columns import EXPORTS
+from brakelab.results.files import brakes_path, read_result
 from brakelab.rig.play.play_log import decoded
 from brakelab.simulation.simulate import simulate as run_scenario
 from brakelab.simulation.vehicle_bus import truth_unit

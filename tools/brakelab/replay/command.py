@@ -30,8 +30,9 @@ from brakelab.replay.source import Source, check_map, delay_line, load_source, r
 from brakelab.replay.summary import WIDTH, brakings_table, listed, prediction_errors, prediction_lines, taps
 from brakelab.results.car import KEY as CAR
 from brakelab.results.car import car_of
+from brakelab.results.columns import EXPORTS
 from brakelab.results.console import new_console
-from brakelab.results.files import EXPORTS, ResultWriter, brakes_path
+from brakelab.results.files import ResultWriter, brakes_path
 from brakelab.results.outputs import check_outputs, config_files
 from brakelab.results.pads import pads_of
 from brakelab.results.prediction import SHORT

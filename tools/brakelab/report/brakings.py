@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
-from brakelab.report.drive import DriveResult, numbers, read_parquet
+from brakelab.report.drive import DriveResult
+from brakelab.results.columns import open_columns
 from brakelab.results.files import brakes_path
 from brakelab.results.prediction import SHORT, left_out
 from brakelab.stretches import stretches
@@ -110,24 +111,16 @@ def _demand(drive: DriveResult) -> Vector:
 
 
 def _from_file(drive: DriveResult, path: Path) -> list[Braking]:
-    table = read_parquet(path, _REMEDY)
-    for name in ("brake", "corner", *_PER_BRAKE, "mu_b_mean"):
-        if name not in table.column_names:
-            raise UserError(str(path), f"column {name}: missing", _REMEDY)
-    corner = np.asarray(table.column("corner").to_pylist())
-    brake = numbers(table, "brake", path)
-    per_brake = {name: numbers(table, name, path) for name in _PER_BRAKE}
-
-    def optional(name: str) -> Vector:
-        if name in table.column_names:
-            return numbers(table, name, path)
-        return np.full(len(brake), np.nan)
-
-    temperature, energy = map(optional, ("disc_temperature_in", "brake_energy"))
-    friction = optional("mu_b_end" if "mu_b_end" in table.column_names else "mu_b_mean")
-    per_corner = [optional(name) for name in ("sigma_mu_b_end", "mu_b_before", "sigma_mu_b_before")]
-    forces = [optional(name) for name in _OF_FORCE]
-    reasons = table.column("left_out").to_pylist() if "left_out" in table.column_names else None
+    table = open_columns(path, _REMEDY, ("brake", "corner", *_PER_BRAKE, "mu_b_mean"))
+    corner, brake = table.columns["corner"], table.numbers("brake")
+    per_brake = {name: table.numbers(name) for name in _PER_BRAKE}
+    temperature, energy = map(table.known_numbers, ("disc_temperature_in", "brake_energy"))
+    friction = table.numbers("mu_b_end" if "mu_b_end" in table.columns else "mu_b_mean")
+    sigma, before, before_sigma = map(
+        table.known_numbers, ("sigma_mu_b_end", "mu_b_before", "sigma_mu_b_before")
+    )
+    forces = [table.known_numbers(name) for name in _OF_FORCE]
+    reasons = table.columns.get("left_out")
     demand, found = _demand(drive), []
     for number in np.unique(brake):
         rows = np.flatnonzero(brake == number)
@@ -140,10 +133,10 @@ def _from_file(drive: DriveResult, path: Path) -> list[Braking]:
         )
         braking = Braking(
             0, t_start, t_start + duration, v_in, v_end, float("nan"), achieved, predicted,
-            friction[order], per_corner[0][order], temperature[order], float(energy[order].sum()),
+            friction[order], sigma[order], temperature[order], float(energy[order].sum()),
             Force(*(float(column[order[0]]) for column in forces)),
-            per_corner[1][order], per_corner[2][order],
-            str(reasons[order[0]] or "") if reasons else left_out(duration, achieved, predicted),
+            before[order], before_sigma[order],
+            str(reasons[order[0]] or "") if reasons is not None else left_out(duration, achieved, predicted),
         )  # fmt: skip
         found.append(braking._replace(demanded=mean_known(demand[inside(drive, braking)])))
     return found

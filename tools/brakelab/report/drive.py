@@ -1,46 +1,16 @@
 """Drive as read by the report: columns over one time axis from Parquet, with the truth mapped onto it."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from brakelab.arrays import Vector
-from brakelab.results.files import refuse_export
+from brakelab.results.columns import Columns, open_columns
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
-
-KEPT: Final = 128 << 20  # bytes of columns
-
-
-class Columns(Mapping[str, Vector]):
-    """Columns, all of one length, that `read` makes when asked for; the last `KEPT` bytes are kept."""
-
-    def __init__(self, names: Iterable[str], read: Callable[[str], Vector]) -> None:
-        self._names, self._read = dict.fromkeys(names), read
-        self._kept: dict[str, Vector] = {}
-
-    def __getitem__(self, name: str) -> Vector:
-        if name not in self._names:
-            raise KeyError(name)
-        values = self._kept.pop(name, None)
-        self._kept[name] = values = self._read(name) if values is None else values
-        while len(self._kept) > 1 and len(self._kept) * values.nbytes > KEPT:
-            del self._kept[next(iter(self._kept))]
-        return values
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._names
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
 
 
 class DriveResult(NamedTuple):
@@ -70,73 +40,33 @@ class DriveResult(NamedTuple):
         return self._replace(columns=Columns(left, self.columns.__getitem__))
 
 
-def read_parquet(path: Path, remedy: str) -> pa.Table:
-    """Return the table; UserError with `remedy` when there is none or it cannot be read."""
-    with _readable(path, remedy):
-        return pq.read_table(path)
-
-
-@contextmanager
-def _readable(path: Path, remedy: str) -> Iterator[None]:
-    refuse_export(path)
-    if not path.is_file():
-        raise UserError(str(path), "no such file", remedy)
-    try:
-        yield
-    except (pa.ArrowException, OSError, ValueError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise UserError(str(path), f"not a readable Parquet file ({reason})", remedy) from error
-
-
-def numbers(table: pa.Table, name: str, path: Path) -> Vector:
-    """Return a column as float64 with NaN for null, shape (n,); UserError when it holds no numbers."""
-    try:
-        return np.asarray(table.column(name).cast(pa.float64()).to_numpy(zero_copy_only=False), np.float64)
-    except pa.ArrowException as error:
-        kind = table.schema.field(name).type
-        raise UserError(str(path), f"column {name}", f"holds {kind}; numbers are needed") from error
-
-
 def read_drive(path: Path, required: tuple[str, ...], remedy: str) -> DriveResult:
-    """Read a result or truth file.
+    """Open a result or truth file; its columns but `required` are read when they are asked for.
 
     Raises UserError when the file is missing or damaged, lacks `t` or a required column, is empty, or
     when `t` does not increase.
     """
-    with _readable(path, remedy):
-        file = pq.ParquetFile(path)
-    for name in ("t", *required):
-        if name not in file.schema_arrow.names:
-            raise UserError(str(path), f"column {name}: missing", remedy)
-    if file.metadata.num_rows < 2:
-        raise UserError(str(path), f"{file.metadata.num_rows} rows", remedy)
-
-    def read(name: str) -> Vector:
-        with _readable(path, remedy):
-            table = file.read([name])
-        return numbers(table, name, path)
-
-    t = read("t")
+    stored = open_columns(path, remedy, ("t", *required))
+    if stored.rows < 2:
+        raise UserError(str(path), f"{stored.rows} rows", remedy)
+    t = stored.numbers("t")
     wrong = np.flatnonzero(~(np.diff(t) > 0.0))
     if wrong.size or not np.isfinite(t).all():
         row = int(wrong[0]) + 1 if wrong.size else 0
         raise UserError(str(path), f"column t, row {row}", "time must be finite and increase from row to row")
+    for name in required:
+        stored.numbers(name)
     numeric = [
         field.name
-        for field in file.schema_arrow
-        if field.name in required
-        or pa.types.is_integer(field.type)
-        or pa.types.is_floating(field.type)
-        or pa.types.is_boolean(field.type)
+        for field in stored.schema
+        if field.name != "t"
+        and (
+            pa.types.is_integer(field.type)
+            or pa.types.is_floating(field.type)
+            or pa.types.is_boolean(field.type)
+        )
     ]
-    metadata = {
-        key.decode(errors="replace"): value.decode(errors="replace")
-        for key, value in (file.metadata.metadata or {}).items()
-    }
-    columns = Columns((name for name in numeric if name != "t"), read)
-    for name in required:
-        columns[name]
-    return DriveResult(t, columns, metadata)
+    return DriveResult(t, Columns(numeric, stored.columns.__getitem__), stored.metadata)
 
 
 def start_ns(drive: DriveResult) -> int | None:

@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
-import pyarrow as pa
 
 from brakelab.arrays import Vector
-from brakelab.report.drive import DriveResult, numbers, read_parquet
+from brakelab.report.drive import DriveResult
+from brakelab.results.columns import open_columns
 from brakelab.results.files import brakes_path
 from ecu.contract.signals import CORNERS
 
@@ -59,18 +59,17 @@ def read_applications(drive: DriveResult, result: Path) -> list[Application]:
     path = brakes_path(result)
     if not path.exists():
         return []
-    table = read_parquet(path, _REMEDY)
-    corner = np.asarray(table.column("corner").to_pylist())
-    brake = numbers(table, "brake", path)
+    table = open_columns(path, _REMEDY, ("corner",))
+    corner, brake = table.columns["corner"], table.numbers("brake")
     first = np.flatnonzero(corner == CORNERS[0])
     order = np.array([np.flatnonzero(corner == name) for name in CORNERS])
     if len(corner) == 0 or order.size != len(corner) or (brake[order] != brake[first]).any():
         return []  # `brakings` has refused it, or there is none
     t, duration, v_in, v_end = (
-        numbers(table, name, path)[first] for name in ("t_start", "duration", "v_in", "v_end")
+        table.numbers(name)[first] for name in ("t_start", "duration", "v_in", "v_end")
     )
     energy, heat, worn, mass, mass_low, mass_high, factor, low, high = (
-        _optional(table, name, path)[order] for name in _PER_CORNER
+        table.known_numbers(name)[order] for name in _PER_CORNER
     )
     after = np.searchsorted(drive.t, t + duration + AFTER)
     ended = after < len(drive.t)
@@ -94,12 +93,6 @@ def _total(values: Vector) -> float:
     """Return the sum over the corners that are known, NaN if none is."""
     known = values[np.isfinite(values)]
     return float(known.sum()) if known.size else float("nan")
-
-
-def _optional(table: pa.Table, name: str, path: Path) -> Vector:
-    if name in table.column_names:
-        return numbers(table, name, path)
-    return np.full(len(table), np.nan)
 
 
 def dirtiest(applications: list[Application]) -> list[Application]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.table import Table
 
+from brakelab.results.columns import Columns
 from brakelab.results.console import new_console
 from brakelab.results.files import Result, brakes_path, read_result
 from brakelab.results.prediction import Errors, errors
@@ -50,7 +51,8 @@ EXACT: Final = (
 BRAKES: Final = "brake applications"
 PROVENANCE: Final = ("version", "vehicle", "observer", "config_hash", "database_hash", "inputs")
 
-Columns = Mapping[str, NDArray[Any]]
+
+Named = Mapping[str, NDArray[Any]]
 
 
 class Difference(NamedTuple):
@@ -72,8 +74,8 @@ class Part(NamedTuple):
     """Rows, or brake applications, that two results have in common."""
 
     title: str
-    before: Columns
-    after: Columns
+    before: Named
+    after: Named
     units: Mapping[str, str]
     only: tuple[int, int]
     """How many only the one and only the other has."""
@@ -156,10 +158,10 @@ def _threshold(name: str, unit: str, values: NDArray[np.float64]) -> float:
     return max(MATTERS.get(unit, 0.0), OF_RMS * rms, 1e-12)
 
 
-def differences(a: Columns, b: Columns, units: Mapping[str, str]) -> list[Difference]:
+def differences(a: Named, b: Named, units: Mapping[str, str]) -> list[Difference]:
     """Return the differences of columns common to both, largest first; equal ones are omitted.
 
-    Columns are float64 of one length; two NaN are equal.
+    Named are float64 of one length; two NaN are equal.
     """
     found = []
     for name in a:
@@ -181,17 +183,17 @@ def differences(a: Columns, b: Columns, units: Mapping[str, str]) -> list[Differ
     return sorted(found, key=lambda difference: -difference.weight)
 
 
-def _row_keys(columns: Columns) -> NDArray[np.int64]:
+def _row_keys(columns: Named) -> NDArray[np.int64]:
     return np.round(1e6 * columns["t"]).astype(np.int64)
 
 
-def _brake_keys(columns: Columns) -> NDArray[np.int64]:
+def _brake_keys(columns: Named) -> NDArray[np.int64]:
     corners = [CORNERS.index(corner) for corner in columns["corner"]]
     return len(CORNERS) * columns["brake"].astype(np.int64) + np.array(corners, np.int64)
 
 
-def _taken(columns: Columns, rows: NDArray[np.int64]) -> Columns:
-    return {name: column[rows] for name, column in columns.items()}
+def _taken(columns: Named, rows: NDArray[np.int64]) -> Named:
+    return Columns(columns, lambda name: columns[name][rows])
 
 
 def _provenance(a: Result, b: Result) -> list[str]:
@@ -208,7 +210,7 @@ def _provenance(a: Result, b: Result) -> list[str]:
     return lines
 
 
-def _judged(brakes: Columns) -> Judged:
+def _judged(brakes: Named) -> Judged:
     counts = (brakes["corner"] == CORNERS[0]) & (brakes["left_out"] == "")
     measured, predicted = (brakes[f"specific_force_{name}"][counts] for name in ("mean", "predicted"))
     last = [float(brakes["mu_b_end"][brakes["corner"] == corner][-1]) for corner in CORNERS]
@@ -246,7 +248,7 @@ def _faults(rows: Part) -> tuple[list[str], list[str]]:
     return fault_names(a & ~b), fault_names(b & ~a)
 
 
-def _seen(columns: Columns) -> int:
+def _seen(columns: Named) -> int:
     """Return the mask of every fault since the ECU has started."""
     unknown = np.full(len(columns["t"]), np.nan)
     words = {word: columns.get(word, unknown) for word in WORDS}
@@ -254,7 +256,7 @@ def _seen(columns: Columns) -> int:
     return int(np.bitwise_or.reduce(np.where(starting, 0, fault_mask(words))))
 
 
-def _part(title: str, one: Result, other: Result, keys: Callable[[Columns], NDArray[np.int64]]) -> Part:
+def _part(title: str, one: Result, other: Result, keys: Callable[[Named], NDArray[np.int64]]) -> Part:
     own, others = keys(one.columns), keys(other.columns)
     both, rows_a, rows_b = np.intersect1d(own, others, return_indices=True)
     before, after = _taken(one.columns, rows_a), _taken(other.columns, rows_b)

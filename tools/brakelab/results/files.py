@@ -6,7 +6,7 @@ unit, the schema's metadata the provenance (version, hashes, start, quality of t
 """
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from brakelab.arrays import arrow_array
 from brakelab.results import mcap_file, mdf
 from brakelab.results.brakes import BRAKE_UNITS, BrakeBook, BrakeRow
+from brakelab.results.columns import EXPORTS, open_columns
 from brakelab.results.pads import KEY, PadState, packed
 from brakelab.results.row import MEASURED_INPUTS
 from ecu.contract.records import RecordArray
@@ -68,16 +69,6 @@ def _brake_schema() -> pa.Schema:
 
 ROW_SCHEMA: Final = _row_schema()
 BRAKE_SCHEMA: Final = _brake_schema()
-
-
-EXPORTS: Final = (mdf.SUFFIX, mcap_file.SUFFIX)
-"""Endings of results for other programs; this one does not read them."""
-
-
-def refuse_export(path: Path) -> None:
-    """Raise UserError for a result in a form for other programs."""
-    if path.suffix in EXPORTS:
-        raise UserError(str(path), "", "results are read from Parquet; `replay` with --out RESULT.parquet")
 
 
 def brakes_path(result: Path) -> Path:
@@ -200,10 +191,10 @@ def _not_written(path: Path, error: OSError) -> UserError:
 
 
 class Result(NamedTuple):
-    """A result file in memory."""
+    """A result file."""
 
-    columns: dict[str, NDArray[Any]]
-    """By name, float64 (text: object); null is NaN; shape (rows,)."""
+    columns: Mapping[str, NDArray[Any]]
+    """By name, float64 (text: object); null is NaN; shape (rows,); read when asked for."""
     units: dict[str, str]
     metadata: dict[str, str]
 
@@ -213,22 +204,7 @@ def read_result(path: Path) -> Result:
 
     Raises UserError if it cannot be read.
     """
-    refuse_export(path)
-    try:
-        table = pq.read_table(path)
-        stored = pq.read_metadata(path).metadata or {}
-    except FileNotFoundError:
-        raise UserError(str(path), "", "no such file; give a result of `brake-ecu replay`") from None
-    except (pa.ArrowInvalid, OSError):
-        raise UserError(
-            str(path), "", "no readable Parquet file; give a result of `brake-ecu replay`"
-        ) from None
-    columns: dict[str, NDArray[Any]] = {}
-    units = {}
-    for field in table.schema:
-        column = table.column(field.name)
-        kind = field.type if pa.types.is_string(field.type) else pa.float64()
-        columns[field.name] = column.cast(kind).to_numpy(zero_copy_only=False)
-        units[field.name] = (field.metadata or {}).get(b"unit", b"").decode()
-    metadata = {key.decode(): value.decode() for key, value in stored.items() if key != b"ARROW:schema"}
-    return Result(columns, units, metadata)
+    stored = open_columns(path, "give a result of `brake-ecu replay`")
+    units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in stored.schema}
+    metadata = {key: text for key, text in stored.metadata.items() if key != "ARROW:schema"}
+    return Result(stored.columns, units, metadata)

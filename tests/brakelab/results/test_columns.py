@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from brakelab.report import drive as module
-from brakelab.report.drive import Columns, DriveResult
+from brakelab.report.drive import DriveResult
+from brakelab.results import columns as module
+from brakelab.results.columns import Columns
 
 ROWS = 100
 
