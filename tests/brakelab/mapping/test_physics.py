@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from brakelab.logs.physics.samples import ANY_CAR, car_of
 from brakelab.mapping.brakes import brakes, flags
 from brakelab.mapping.curves import at_rest, curves
-from brakelab.mapping.motion import motion_of, wheel_speeds
+from brakelab.mapping.motion import motion_of, vehicle_speed, wheel_speeds
 from brakelab.mapping.physics import propose
 from brakelab.mapping.scale import scale_of
 from brakelab.mapping.series import Series, with_signs
@@ -94,6 +94,13 @@ def test_the_finer_of_two_messages_of_the_same_names_is_taken(coarse_first):
     sets = [named(names, "ROUGH_WHEEL_SPEED", 1.0), named(names, "WHEEL_SPEEDS", 0.01)]
     first, second = sets if coarse_first else sets[::-1]
     assert {one.message for one in wheel_speeds([*first, *second]).values()} == {"WHEEL_SPEEDS"}
+
+
+@pytest.mark.parametrize("names", [("WHL_SPD_RL", "WHL_SPD_RR"), ("WheelSpeed_FL",)])
+def test_a_wheel_stands_for_the_car_where_nothing_else_tells_its_speed(names):
+    wheels = [series(name, 3.6 * ROAD.speed, "km/h") for name in names]
+    assert vehicle_speed(wheels).signal in names
+    assert vehicle_speed([*wheels, series("Speed", 3.6 * ROAD.speed, "km/h")]).signal == "Speed"
 
 
 def test_axles_may_come_in_messages_of_their_own():
@@ -243,12 +250,33 @@ def found(*others, car=SUV):
     return {one.target: one for one in [*brakes(list(others), MOTION, car), *flags(list(others), MOTION)]}
 
 
-@pytest.mark.parametrize("counts", [3.2, 0.25, 10.0])
-def test_a_pressure_without_a_unit_gets_the_scale_of_configured_brakes(counts):
-    one = found(series("BRAKE_PRESSURE", counts * BAR))["calliper_pressure_rl"]
+@pytest.mark.parametrize(
+    ("counts", "zero", "unit"),
+    [(3.2, 0.0, ""), (0.25, 0.0, ""), (10.0, 0.0, "-"), (0.02, 0.5, "V"), (0.6, 0.0, "%")],
+)
+def test_a_pressure_without_a_unit_gets_the_scale_of_configured_brakes(counts, zero, unit):
+    """A zero that no sound sensor has is taken off, that of a sound one is left to the ECU."""
+    one = found(series("BRAKE_PRESSURE", zero + counts * BAR, unit))["calliper_pressure_rl"]
     assert one.unit == "bar"
     assert one.factor == pytest.approx(1.0 / counts, rel=0.2)
+    assert one.offset == pytest.approx(-zero * one.factor, rel=0.01)
     assert "friction is relative" in one.warning
+
+
+@pytest.mark.parametrize(
+    ("names", "of_wheels"),
+    [
+        (("Brake Pres Front", "Brake Pres Rear"), (0, 0, 1, 1)),
+        (("BrakePressure_R", "BrakePressure_F"), (1, 1, 0, 0)),
+        (("Brake Pres Front", "Brake Pres Clutch"), (0, 0, 0, 0)),
+    ],
+)
+def test_each_axle_has_its_own_pressure(names, of_wheels):
+    both = [series(name, share * BAR, "bar") for name, share in zip(names, (1.0, 0.8), strict=True)]
+    inputs = found(*both)
+    taken = [inputs[f"calliper_pressure_{corner}"].series.signal for corner in CORNERS]
+    assert taken == [names[place] for place in of_wheels]
+    assert "pedal_position" not in inputs
 
 
 def test_decelerations_on_the_motors_alone_scale_no_pressure():
@@ -339,6 +367,8 @@ CASES = [
     ("m/s2", 0.102, 0.99, False, 1.0, "it would fit g"),
     ("", 0.98, 0.99, False, 1.0, ""),
     ("", -41.8, 0.99, False, -0.0239, "no unit"),
+    ("", 0.072, 0.83, False, 9.80665, "no unit"),  # noise explains a fifth of a slope, never nine tenths
+    ("", 0.66, 0.83, False, 1.0, ""),
     ("deg/s", 0.6, 0.96, True, 1.0, ""),
     ("deg/s", 0.6, 0.96, False, 1.0, "slope +0.60"),
 ]

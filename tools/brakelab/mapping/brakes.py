@@ -4,17 +4,20 @@ from typing import Final
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.logs.physics.line import BRAKING, MOVING, Fit
 from brakelab.logs.physics.pressures import OVERRUN
 from brakelab.logs.physics.samples import Car
 from brakelab.mapping.candidates import best_of, by_name, unit_of
 from brakelab.mapping.motion import Found, Motion
-from brakelab.mapping.names import converts, corner_of, score, tells_brake, tells_pressure
+from brakelab.mapping.names import axle_of, converts, corner_of, score, tells_brake, tells_pressure
 from brakelab.mapping.series import Series
+from ecu.algorithm.estimation.zero import LARGEST_ZERO
 from ecu.contract.signals import CORNERS
 
 READS_AS_BAR: Final = 1.25  # and its inverse: of a scale that friction explains
 APPLIED: Final = 0.3  # of the greatest pressure
+GAINS: Final = 0.2  # m/s^2, of a car whose brakes are released
 BACKWARDS: Final = 8.0  # m/s; nobody reverses faster. Assumption
 SELDOM: Final = 0.1  # of a drive, that ABS or ESP may act
 FULL: Final = 100.0  # %
@@ -58,35 +61,50 @@ def _pressures(best: Series, line: Fit | None, series: list[Series], motion: Mot
     evidence = "by its name; the drive shows no brake application to check it by"
     if line:
         evidence = f"against deceleration: correlation {line.correlation:.2f}"
-    _, stem = corner_of(best.signal)
-    others = {corner_of(one.signal)[0]: one for one in series if corner_of(one.signal)[1] == stem}
-    whole = set(CORNERS) <= set(others)
-    factor, warning = 1.0, ""
+    each, whole = _of_wheels(best, series)
+    factor, zeros, warning = 1.0, np.zeros(len(CORNERS)), ""
     if not converts(best.unit, "bar"):
-        each = [others[corner] if whole else best for corner in CORNERS]
-        factor, warning = _without_unit(each, motion, car)
+        zeros = _at_rest(each, motion)
+        factor, warning = _without_unit(each, zeros, motion, car)
         if not tells_pressure(best.message, best.signal):
             warning += "; nor does its name say that it is a pressure"
     found = []
-    for corner in CORNERS:
-        one = others[corner] if whole else best
-        shown = evidence if whole else f"{evidence}; one pressure for all wheels"
+    for corner, one, zero in zip(CORNERS, each, factor * zeros, strict=True):
+        shown, offset = f"{evidence}{whole}", 0.0
+        if abs(zero) > LARGEST_ZERO:
+            shown, offset = f"{shown}; {zero / factor:+.3g} while released", -float(f"{zero:.4g}")
         unit = unit_of("calliper_pressure_fl", one)
         name = f"calliper_pressure_{corner}"
-        found.append(Found(name, one, factor, 0.0, unit, shown, line is not None, warning))
+        found.append(Found(name, one, factor, offset, unit, shown, line is not None, warning))
     return found
 
 
-def _without_unit(each: list[Series], motion: Motion, car: Car) -> tuple[float, str]:
+def _of_wheels(best: Series, series: list[Series]) -> tuple[list[Series], str]:
+    """Return the signal of each wheel, and what to say where one stands for several."""
+    for part_of, parts in ((corner_of, CORNERS), (axle_of, ("front", "front", "rear", "rear"))):
+        stem = part_of(best.signal)[1]
+        alike = [one for one in series if one.unit == best.unit and part_of(one.signal)[1] == stem]
+        others = {part_of(one.signal)[0]: one for one in alike}
+        if set(parts) <= set(others):
+            return [others[part] for part in parts], "" if part_of is corner_of else "; one for each axle"
+    return [best] * len(CORNERS), "; one pressure for all wheels"
+
+
+def _at_rest(each: list[Series], motion: Motion) -> Vector:
+    """Return what the signals read while the car gains speed: the brakes are released."""
+    released = motion.faster(MOVING) & (motion.change > GAINS)
+    if not released.any():
+        return np.zeros(len(each))
+    return np.array([np.median(motion.smoothed(one)[released]) for one in each])
+
+
+def _without_unit(each: list[Series], zeros: Vector, motion: Motion, car: Car) -> tuple[float, str]:
     """Return factor and warning of pressures without a unit: what the brakes of CONFIG need."""
-    unitless = "the database states no unit"
+    unitless = "no unit of pressure is stated"
     if car.brakes is None:
         return 1.0, f"{unitless}, taken for bar: friction is off by its scale; --config CONFIG shows more"
-    pressures = np.stack([motion.smoothed(one) for one in each], axis=1)
+    pressures = np.stack([motion.smoothed(one) for one in each], axis=1) - zeros
     braking = motion.faster(MOVING) & (motion.change < -BRAKING)
-    released = motion.faster(MOVING) & (motion.change > 0.2)
-    zero = np.median(pressures[released], axis=0) if released.any() else np.zeros(len(CORNERS))
-    pressures = pressures - zero
     applied = pressures.sum(axis=1)  # not by motors alone
     braking &= applied > APPLIED * np.percentile(applied[motion.faster(MOVING)], 99)
     expected = float((pressures[braking] @ car.brakes.decel_per_bar).sum())

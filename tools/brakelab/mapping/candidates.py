@@ -10,7 +10,7 @@ from brakelab.arrays import Vector
 from brakelab.logs.physics.line import Fit, fit
 from brakelab.logs.physics.samples import Rows
 from brakelab.mapping.motion import Motion, contract_unit
-from brakelab.mapping.names import converts, names_itself, score, tells_direction, tells_pressure
+from brakelab.mapping.names import converts, counts, names_itself, score, tells_direction, tells_pressure
 from brakelab.mapping.series import Series, coarseness
 from ecu.bus.units import spelled
 
@@ -39,13 +39,21 @@ def best_of(
     fitting: list[tuple[float, Series, Fit]] = []
     for one in series:
         points = score(one.signal, target)
-        if one.flag or points < 0 or not (converts(one.unit, unit) or (not one.unit and points >= 1)):
+        if (
+            one.flag
+            or points < 0
+            or not (converts(one.unit, unit) or (counts(one.unit, unit) and points >= 1))
+        ):
             continue
         if (unit == "%" and points < 1) or len(np.unique(one.value)) <= STEPS:
             continue
         found = fit(motion.smoothed(one), reference, rows & motion.near(one))
         strength = found.correlation * fixed_sign if fixed_sign else abs(found.correlation)
-        said = one.unit.strip() or unit == "%" or (unit == "bar" and tells_pressure(one.message, one.signal))
+        said = (
+            not counts(one.unit, unit)
+            or unit == "%"
+            or (unit == "bar" and tells_pressure(one.message, one.signal))
+        )
         named = points > 0 and said
         least = LEAST_CORRELATION if named else LEAST_ALONE
         if not strength >= least:

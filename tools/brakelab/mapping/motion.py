@@ -130,14 +130,15 @@ def wheel_speeds(series: Iterable[Series]) -> dict[str, Series]:
 
 
 def vehicle_speed(series: Iterable[Series]) -> Series | None:
-    """Return the car's speed, by its name, of several the least coarse; None: no name speaks of it."""
-    named = [(score(one.signal, "vehicle_speed"), one) for one in series if _is_speed(one)]
-    fitting = [(points, -coarseness(one), place) for place, (points, one) in enumerate(named) if points >= 1]
-    return named[max(fitting)[2]][1] if fitting else None
+    """Return the car's speed, by its name, of several the least coarse; else that of a wheel."""
+    along = [one for one in series if not one.flag and converts(one.unit, "m/s")]
+    cars = [one for one in along if not corner_of(one.signal)[0] and score(one.signal, "vehicle_speed") >= 1]
+    wheels = [one for one in along if score(one.signal, "wheel_speed") >= 2]
 
+    def worth(one: Series) -> tuple[float, float]:
+        return score(one.signal, "vehicle_speed"), -coarseness(one)
 
-def _is_speed(one: Series) -> bool:
-    return not one.flag and converts(one.unit, "m/s") and not corner_of(one.signal)[0]
+    return max(cars or wheels, key=worth, default=None)
 
 
 def speeds(series: Sequence[Series]) -> dict[str, Series]:

@@ -74,6 +74,11 @@ CHECKING: Final = {"crc", "cs", "checksum", "chk", "chksum", "qf", "qbit"}
 """Words of what a frame says of itself."""
 
 
+_AXLES: Final = {"front": ("front", "frt", "f", "vorn", "va"), "rear": ("rear", "r", "hinten", "ha")}
+COUNTS: Final = ("", "v", "mv", "volt", "%", "-", "raw", "count", "counts")
+"""Units of a pressure that leave its scale open: a sensor's own voltage, a share of its range."""
+
+
 def words(name: str) -> list[str]:
     """Return the words of a signal's name in lower case: `WhlFl_W_Meas` gives whl, fl, w, meas."""
     parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name.replace("_", " "))
@@ -89,6 +94,16 @@ def corner_of(name: str) -> tuple[str, str]:
             for corner, spellings in _CORNERS.items():
                 if joined in spellings:
                     return corner, "_".join(parts[:place] + parts[place + length :])
+    return "", "_".join(parts)
+
+
+def axle_of(name: str) -> tuple[str, str]:
+    """Return the axle, front or rear, that a name speaks of and the name without it; empty: of none."""
+    parts = words(name)
+    for place, part in enumerate(parts):
+        for axle, spellings in _AXLES.items():
+            if part in spellings:
+                return axle, "_".join(parts[:place] + parts[place + 1 :])
     return "", "_".join(parts)
 
 
@@ -126,6 +141,11 @@ def names_itself(name: str, target: str) -> bool:
     """Return whether the name of a flag holds the first word of the input's own, in one of its spellings."""
     own = ("abs",) if target == "abs_active" else WORDS[target][:5]
     return bool(set(own) & set(words(name))) or any(part.startswith(own) for part in words(name))
+
+
+def counts(unit: str, target_unit: str) -> bool:
+    """Return whether a unit leaves the scale open: none, or what a pressure's sensor counts in."""
+    return unit.strip().lower() in COUNTS if target_unit == "bar" else not unit.strip()
 
 
 def converts(unit: str, target_unit: str) -> bool:

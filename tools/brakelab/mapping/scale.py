@@ -7,10 +7,10 @@ from brakelab.mapping.series import Series
 from ecu.bus.units import CONVERSIONS
 
 UNIT_SLOPE: Final = 1.25  # and its inverse: beyond, neither sign nor unit explains it
+RADIUS: Final = "; or the wheels do not have the radius assumed"
 LEAST_IN_CURVES: Final = (
     0.4  # of a slope over the wheels' yaw rate: the outer tyre, pressed flat, turns faster
 )
-CLEAN: Final = 0.95  # correlation, below which noise of the reference alone makes a slope small
 
 
 class Scale(NamedTuple):
@@ -30,16 +30,18 @@ def scale_of(one: Series, slope: float, correlation: float, in_curves: bool = Fa
     """
     sign, size = math.copysign(1.0, slope), abs(slope)
     least = LEAST_IN_CURVES if in_curves else 1.0 / UNIT_SLOPE
-    if size <= UNIT_SLOPE and (size >= least or abs(correlation) < CLEAN):
+    least *= correlation * correlation  # noise of the reference makes a slope no smaller
+    if least <= size <= UNIT_SLOPE:
         return Scale(sign, "")
-    if not one.unit.strip():
-        factor = float(f"{1.0 / slope:.3g}")
-        return Scale(factor, f"the database states no unit; factor {factor:g} is by the motion of this drive")
-    looks = [
-        f"; it would fit {unit}"
+    looks = {
+        unit: scale
         for units in (CONVERSIONS["rad/s"], CONVERSIONS["m/s^2"])
         for unit, (scale, _) in units.items()
         if scale != 1.0 and least < size * scale < UNIT_SLOPE
-    ]
-    likely = looks[0] if looks else "; or the wheels do not have the radius assumed"
+    }
+    if not one.unit.strip():
+        factor = next((sign * scale for scale in looks.values()), float(f"{1.0 / slope:.3g}"))
+        why = f"the database states no unit; factor {factor:.3g} is by the motion of this drive"
+        return Scale(factor, why)
+    likely = next((f"; it would fit {unit}" for unit in looks), RADIUS)
     return Scale(sign, f"slope {slope:+.2f} instead of {sign:+.0f}: check unit and scale{likely}")

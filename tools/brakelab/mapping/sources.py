@@ -14,6 +14,7 @@ from brakelab.mapping.names import (
     COUNTING,
     converts,
     corner_of,
+    counts,
     names_itself,
     score,
     tells_direction,
@@ -135,7 +136,7 @@ def _looked_at(
         if points < 2:
             return None
         return likely - 1.0, one, f"only {values} value{'s' if values > 1 else ''} in this drive"
-    if one.unit.strip() and not fits:
+    if not counts(one.unit, unit) and not fits:
         return likely, one, f"by its name, but {one.unit} does not turn into {unit}"
     rows = reference.rows & motion.near(one)
     if rows.sum() < ENOUGH:
