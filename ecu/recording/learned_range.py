@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.algorithm.estimation.joint.whole_filter import HIGHEST_STATE, KEPT, LOWEST_STATE
+from ecu.algorithm.estimation.joint.whole_filter import HIGHEST_STATE, LOWEST_STATE
 from ecu.algorithm.monitoring.wear import ENERGY, ENERGY_T, POWER2, POWER2_T, RATE, RATE_T
 from ecu.contract.records import N_MEASURED, RecordArray
 
@@ -36,7 +36,7 @@ def out_of_range(learned: RecordArray, mu_nominal: NDArray[np.float64]) -> str:
         "radius_sigma": np.isfinite(row["radius_sigma"]) & (row["radius_sigma"] > 0),
         "joint": np.abs(row["joint"]) <= JOINT_LIMIT,
         "joint_covariance": np.asarray(not row["joint_known"] or is_covariance(p)),
-        "whole": (row["whole"] >= LOWEST_STATE[:KEPT]) & (row["whole"] <= HIGHEST_STATE[:KEPT]),
+        "whole": (row["whole"] >= LOWEST_STATE) & (row["whole"] <= HIGHEST_STATE),
         "whole_covariance": np.asarray(is_covariance(covariance_of(row["whole_covariance"]))),
         "disc_excess": (row["disc_excess"] >= 0) & (row["disc_excess"] <= DISC_EXCESS_LIMIT),
         "brakings": np.asarray(row["brakings"] >= 0),

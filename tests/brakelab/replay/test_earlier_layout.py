@@ -30,6 +30,10 @@ def earlier(without: str = "") -> np.dtype:
             )
         if name == "distribution":
             part = np.dtype([(field, part[field]) for field in part.names if field not in ("grip", "rolled")])
+        if name == "learned":
+            shorter = {"whole": ("f8", (3,)), "whole_covariance": ("f8", (6,))}
+            fields = [(field, *shorter.get(field, (part[field],))) for field in part.names]
+            part = np.dtype(fields, align=True)
         if name in ("flags", "witness"):
             continue
         parts.append(("friction_torque" if name == "hydraulics" else name, part))
@@ -45,13 +49,16 @@ def test_every_state_goes_on_under_its_present_name() -> None:
     old["friction_torque"]["value"], old["friction_torque"]["agreed_s"] = [1.0, 2.0, 3.0, 4.0], 0.5
     old["joint"]["x"], old["joint"]["zero"]["value"] = np.arange(old["joint"]["x"].shape[1]), 0.7
     old["learned"] = np.frombuffer(bytes(range(1, 256)) * 40, old["learned"].dtype, 1)
+    old["learned"]["whole_covariance"] = np.arange(6.0)
     new = convert_initial(old, started())
     assert new.dtype == INITIAL
     assert new["hydraulics"]["value"].tolist() == [[1.0, 2.0, 3.0, 4.0]]
     assert new["hydraulics"]["agreed_s"].tolist() == [[0.5] * 4]
     assert new["joint"]["zero"]["value"].tolist() == [[0.7] * 4]
     np.testing.assert_array_equal(new["joint"]["x"], old["joint"]["x"])
-    assert new["learned"].tobytes() == old["learned"].tobytes()
+    assert new["learned"]["whole_covariance"].tolist() == [[*range(6), *[0.0] * 9]]
+    alike = [name for name in old["learned"].dtype.names if not name.startswith("whole")]
+    assert all(new["learned"][name].tobytes() == old["learned"][name].tobytes() for name in alike)
     assert (new["distribution"]["rolled"] == 1.0).all()
     assert np.isnan(new["flags"]["last"])
     assert not new["joint"]["follows"].any()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from structlog.testing import capture_logs
 
-from ecu.algorithm.estimation.joint.whole_filter import HIGHEST_STATE, KEPT, LOWEST_STATE
+from ecu.algorithm.estimation.joint.whole_filter import HIGHEST_STATE, LOWEST_STATE
 from ecu.contract.records import DUST, LEARNED, N_KEPT, N_MEASURED, WEAR, new_record
 from ecu.errors import UserError
 from ecu.recording import revisions
@@ -220,7 +220,8 @@ OUT_OF_RANGE = {
     "radius is no number": {"radius_error": np.nan},
     "negative time": {"observed_s": -1.0},
     "negative count": {"brakings": -1},
-    "drag that no car has": {"whole": [[0.0, 0.0, 2.6]]},
+    "drag that no car has": {"whole": [[0.0, 0.0, 2.6, 0.0, 0.0]]},
+    "motors that drive while they blend": {"whole": [[0.0, 0.0, 0.2, -0.1, 0.0]]},
     "negative variance": {"joint_covariance": triangle(NEGATIVE)},
     "correlation above one": {"joint_covariance": triangle(TIED_TOO_MUCH)},
     "covariance is no number": {"joint_covariance": triangle(NOT_FINITE)},
@@ -237,7 +238,7 @@ def test_a_value_that_cannot_be_falls_back_to_the_revision_before(tmp_path, wron
     assert (revision, found["brakings"][0]) == (1, 7)
 
 
-@pytest.mark.parametrize("bound", [LOWEST_STATE[:KEPT], HIGHEST_STATE[:KEPT]])
+@pytest.mark.parametrize("bound", [LOWEST_STATE, HIGHEST_STATE])
 def test_what_whole_applications_have_learned_comes_back_at_its_bounds(tmp_path, bound):
     store = open_store(tmp_path)
     save(store, KEY, learned(whole=bound))

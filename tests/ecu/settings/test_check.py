@@ -133,7 +133,7 @@ def test_a_learned_ceiling_is_compared_with_the_pedal(
     config = load_config(CONFIGS / "suv.toml")
     learned = new_state(new_params(config))["learned"].copy()
     learned["whole"][0, GRIP] = math.log(7.0 / CEILING)
-    learned["whole_covariance"][0] = np.diag([0.01, variance, 0.01])[np.tril_indices(3)]
+    learned["whole_covariance"][0] = np.diag([0.01, variance, 0.01, 0.1, 1.0])[np.tril_indices(5)]
     with closing(open_store(tmp_path)) as store:
         save(store, store_key(config), learned)
     assert cli.main(["config", "check", str(CONFIGS / "suv.toml"), "--state", str(tmp_path)]) == 0

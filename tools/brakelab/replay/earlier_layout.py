@@ -6,6 +6,8 @@ Version 0.1 before November 2026 kept two models of the hydraulics, one of which
 from ecu.contract.records import RecordArray
 
 RENAMED = {"hydraulics": "friction_torque"}  # present name: earlier one
+# Hold what an earlier version had of them first, and are unknown beyond.
+GROWN = {"whole", "whole_covariance"}
 # Begin as in a new state.
 ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"} | {
     *("pressures", "flags", "accel_error", "witness", "motors", "turning", "speeds", "wheel_unit"),
@@ -133,6 +135,9 @@ def _copy(source: RecordArray, target: RecordArray) -> bool:
         if target.dtype[name].names:
             if not source.dtype[earlier].names or not _copy(source[earlier], target[name]):
                 return False
+        elif name in GROWN:
+            first = source[earlier].shape[-1]
+            target[name][..., :first] = source[earlier][..., : target[name].shape[-1]]
         elif source.dtype[earlier] != target.dtype[name]:
             return False
         else:

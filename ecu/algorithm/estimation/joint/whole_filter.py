@@ -25,7 +25,6 @@ from ecu.jit import Record, kernel
 
 SCALE, GRIP, OVERRUN, PEDAL, POWER = range(5)
 STATES = 5
-KEPT = 3  # of them: the others belong to a drive
 CEILING = 14.0  # m/s^2: a first braking at 12 must be possible before any was seen
 FULL_TORQUE, USUAL_SPEED = 7.0, 10.0  # m/s, below which power falls with speed; V
 PRIOR_MEAN = np.array([0.0, 0.0, 0.2, 0.0, 0.0])  # the drags in m/s^2, the power in W/kg
@@ -33,7 +32,8 @@ PRIOR = np.array([0.25, 0.5, 0.5, 0.5, 3.0])  # standard deviations: an engine d
 STEP = np.array([0.04, 0.03, 0.05, 0.1, 0.1])  # between applications, of a car with the usual noise
 # Priors of scale, drag [m/s^2] and power [W/kg] beside windows, which teach nearly all; their step.
 BESIDE, BESIDE_DRAG, BESIDE_POWER, BESIDE_STEP = 0.03, 0.05, 0.5, 0.006
-PAUSE = np.array([0.03, 0.15, 0.1])  # of unknown length: rain, another road, another day
+# Of unknown length: rain, another road, another day; a full battery blends less.
+PAUSE = np.array([0.03, 0.15, 0.1, 0.3, 1.0])
 LOWEST_STATE = np.array([-0.7, math.log(3.0 / CEILING), -1.0, 0.0, -20.0])
 # Motors with the accelerator released brake by 2.5 m/s^2, blended ones take 30 kW of a car of 1.5 t.
 HIGHEST_STATE = np.array([0.6, math.log(30.0 / CEILING), 2.5, 2.5, 20.0])
@@ -65,7 +65,7 @@ def restore_filter(state: Record, learned: Record) -> None:
     if learned.whole_covariance[0] == 0.0:
         return
     place = 0
-    for i in range(KEPT):
+    for i in range(STATES):
         state.value[i] = learned.whole[i]
         for j in range(i + 1):
             state.covariance[i, j] = state.covariance[j, i] = learned.whole_covariance[place]
@@ -87,7 +87,7 @@ def forget_filter(state: Record) -> None:
 def keep_filter(state: Record, learned: Record) -> None:
     """Write the present states into `learned`."""
     place = 0
-    for i in range(KEPT):
+    for i in range(STATES):
         learned.whole[i] = state.value[i]
         for j in range(i + 1):
             learned.whole_covariance[place] = state.covariance[i, j]

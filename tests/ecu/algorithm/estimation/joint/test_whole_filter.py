@@ -13,14 +13,12 @@ from ecu.algorithm.estimation.joint.whole_filter import (
     FULL_TORQUE,
     GRIP,
     HIGHEST_STATE,
-    KEPT,
     LOWEST_STATE,
     OVERRUN,
     PAUSE,
     PEDAL,
     POWER,
     PRIOR,
-    PRIOR_MEAN,
     SCALE,
     STATES,
     USUAL_SPEED,
@@ -86,18 +84,15 @@ def test_a_constant_power_drags_less_the_faster_the_car(speed: float, drag: floa
 
 
 def test_what_was_learned_comes_back_less_certain(state: Any) -> None:
-    """What belongs to a drive does not come back."""
     learned = np.zeros(1, LEARNED)[0]
     state["value"], state["covariance"] = [0.2, -0.3, 0.5, 0.3, 2.0], 0.001 * (np.eye(STATES) + 0.2)
     keep_filter(state, learned)
     again = np.zeros(1, FILTER_STATE)[0]
     restore_filter(again, learned)
-    assert (again["value"] == [0.2, -0.3, 0.5, *PRIOR_MEAN[KEPT:]]).all()
-    before = state["covariance"][:KEPT, :KEPT]
-    wider = np.minimum(np.diag(before) + PAUSE**2, PRIOR[:KEPT] ** 2)
-    expected = np.diag(PRIOR**2)
-    expected[:KEPT, :KEPT] = before + np.diag(wider - np.diag(before))
-    assert again["covariance"] == pytest.approx(expected)
+    assert (again["value"] == state["value"]).all()
+    before = state["covariance"]
+    wider = np.minimum(np.diag(before) + PAUSE**2, PRIOR**2)
+    assert again["covariance"] == pytest.approx(before + np.diag(wider - np.diag(before)))
 
 
 @pytest.mark.parametrize(
