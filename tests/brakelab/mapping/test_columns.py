@@ -7,6 +7,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from brakelab.logs.column_map import read_column_map
 from ecu import cli
 
 RADIUS, TRACK, GRAVITY = 0.33, 1.55, 9.80665
@@ -185,3 +186,24 @@ def test_a_mistake_is_one_line(
     said = capsys.readouterr().err
     assert says in said
     assert said.count("brake-ecu: ") == said.count("\n") - said.startswith("reading") == 1
+
+
+@pytest.mark.parametrize("felt", [True, False], ids=["accelerometer", "pressures alone"])
+@pytest.mark.parametrize("late", [0.0, 0.3])
+def test_a_speed_that_comes_late_is_proposed_so(tmp_path: Path, felt: bool, late: float) -> None:
+    """The car follows its pressures after 0.08 s."""
+    table = pd.read_csv(write_drive(tmp_path / "aim.csv", seconds=160.0), skiprows=[1])
+    t = table["Time"]
+    columns = {
+        "Time [s]": t,
+        "GPS Speed [km/h]": np.interp(t - late, t, table["WheelSpd_FL"]),
+        "BrakePress [bar]": np.interp(t + 0.08, t, table["BrakePress"]),
+    }
+    if felt:
+        columns["LongAcc [g]"] = -table["InlineAcc"]
+    log, out = tmp_path / "gps.csv", tmp_path / "map.toml"
+    pd.DataFrame(columns).to_csv(log, index=False)
+    assert cli.main(["map", "suggest", str(log), "--out", str(out)]) == 0
+    lags = {name: one.lag for name, one in read_column_map(out).content.inputs.items()}
+    assert lags.pop("vehicle_speed") == pytest.approx(late, abs=0.03)
+    assert set(lags.values()) == {0.0}

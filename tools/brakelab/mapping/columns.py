@@ -8,15 +8,18 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from brakelab.arrays import Vector
-from brakelab.logs.column_map import SECONDS, TIMES
+from brakelab.logs.column_map import LONGEST_LAG_S, SECONDS, TIMES
 from brakelab.logs.log_quality import SignalQuality
-from brakelab.logs.physics.samples import Car
+from brakelab.logs.physics.lags import RADIUS, lags
+from brakelab.logs.physics.samples import SAMPLED, Car, InputSeries
 from brakelab.logs.signal_batches import Columns, columns_of, rows_of, time_of
 from brakelab.logs.signal_file import check_seconds
 from brakelab.mapping.map_text import input_lines, needs_radius, radius_line
-from brakelab.mapping.motion import Found
+from brakelab.mapping.motion import Found, Motion, contract_unit
 from brakelab.mapping.names import converts
 from brakelab.mapping.series import FEWEST_FRAMES, Series, the_first
+from ecu.bus.units import CONVERSIONS
+from ecu.contract.signals import INPUT, without_corner
 from ecu.errors import UserError
 
 FLAG: Final = {0.0, 1.0}
@@ -68,6 +71,24 @@ def _series(name: str, unit: str, t: Vector, value: Vector) -> Series:
     period = float(np.median(np.diff(t))) if len(t) > 1 else np.nan
     flag = set(np.unique(value[:1000]).tolist()) <= FLAG and not converts(unit, "m/s")
     return Series("", name, unit, 0, period, flag, t, value)
+
+
+def with_lags(found: list[Found], motion: Motion) -> list[Found]:
+    """Return what was found, with the lags that the drive shows."""
+    samples = np.full((len(motion.t), len(SAMPLED)), np.nan)
+    for one in found:
+        if (place := INPUT[one.target]) in SAMPLED:
+            known = CONVERSIONS[contract_unit(one.target)]
+            scale = known[one.unit][0] if one.unit in known else CONVERSIONS["m/s"][one.unit][0] / RADIUS
+            values = (motion.values(one.series) * one.factor + one.offset) * scale
+            samples[:, SAMPLED.index(place)] = np.where(motion.near(one.series), values, np.nan)
+    late = {lag.name: lag for lag in lags(InputSeries(samples)) if abs(lag.seconds) <= LONGEST_LAG_S}
+
+    def mended(one: Found) -> Found:
+        lag = late.get(without_corner(one.target))
+        return one if lag is None else one._replace(lag=lag.seconds, evidence=f"{one.evidence}; {lag.line}")
+
+    return [mended(one) for one in found]
 
 
 def column_map_text(

@@ -14,7 +14,7 @@ from brakelab.logs.column_map import read_column_map
 from brakelab.logs.formats import kind_of, read_frames
 from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.physics.samples import ANY_CAR, Car, car_of
-from brakelab.mapping.columns import column_map_text, read_column_series
+from brakelab.mapping.columns import column_map_text, read_column_series, with_lags
 from brakelab.mapping.drive_torque import motors
 from brakelab.mapping.map_text import input_lines, needs_radius, radius_line
 from brakelab.mapping.motion import Found, wheel_speeds
@@ -121,6 +121,7 @@ def _suggest_columns(log: Path, out: Path | None, car: Car) -> None:
         raise UserError(str(log), "", f"{among}; write the map by hand (docs/signal-maps.md)")
     wheel = found[0].series
     _refuse_unitless(log, wheel, f'write it behind the names: "{wheel.signal} [km/h]"', car)
+    found = with_lags(found, motion)
     others = other_sources(found, series, motion, car)
     _show(found, motion.drives, others, [])
     after = {one.target: timeout(one) for one in found}

@@ -28,6 +28,8 @@ def input_lines(
         entry += f", offset = {one.offset:.6g}"
     if one.unit != spelled(one.series.unit) or not unit_known:
         entry += f', unit = "{one.unit}"'
+    if one.lag:
+        entry += f", lag = {one.lag:.2f}"
     if after:
         entry += f", timeout = {after:g}"
     return [*lines, f"{one.target} = {{ {entry} }}"]

@@ -32,6 +32,8 @@ class Found(NamedTuple):
     sure: bool
     """Physics agrees; else the name alone speaks for it."""
     warning: str = ""
+    lag: float = 0.0
+    """By which it comes late [s]; columns alone have one."""
 
 
 class Motion(NamedTuple):

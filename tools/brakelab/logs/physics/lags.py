@@ -4,7 +4,8 @@
 
 Slip makes the speed of a wheel lead by up to a quarter of a second, so that wheels are compared by the axle
 that is not driven, while the car does not brake: by the later one, if they differ. A sensor comes late, not
-early, so the earliest input is right, unless it precedes the pressures. The standard deviation is that of the
+early, so the earliest input is right, unless it precedes the pressures. Without an accelerometer pressures
+stand for it, which the car's deceleration follows `ANSWERS` later. The standard deviation is that of the
 mean over parts of the drive.
 """
 
@@ -29,6 +30,7 @@ LEAST_LAG: Final = 0.03  # s, that matters
 UNDRIVEN: Final = 0.05  # s, by which the axle that is not driven comes later than the other
 BESIDE: Final = int(0.4 * RATE)  # rows beside a braking
 ANSWERS: Final = 0.08  # s, from the pressure to the deceleration
+ANSWERS_SIGMA: Final = 0.03  # s, of that, from car to car
 PRECEDES: Final = -0.08  # s, likewise, that no car's deceleration does
 SLIPS: Final = 0.05  # s, by which a speed that is counted at wheels comes earlier while they slip
 RADIUS: Final = 0.3  # m, about
@@ -54,7 +56,8 @@ class Lag(NamedTuple):
 def lags(series: InputSeries) -> list[Lag]:
     """Return the inputs that come late or early by more than their uncertainty, where the drive shows it."""
     if "accel_x" not in series:
-        return []
+        behind = (_behind_pressures(series, name) for name in ("wheel_speed", "vehicle_speed"))
+        return [lag for lag in behind if lag and lag.seconds > max(LEAST_LAG, 3.0 * lag.sigma)]
     accel = series["accel_x"]
     found = {
         name: lag for name in ("wheel_speed", "vehicle_speed") if (lag := _speed_lag(series, accel, name))
@@ -72,12 +75,30 @@ def lags(series: InputSeries) -> list[Lag]:
     return [lag for lag in late if abs(lag.seconds) > max(LEAST_LAG, 3.0 * lag.sigma)]
 
 
+def _behind_pressures(series: InputSeries, name: str) -> Lag | None:
+    """Return by how much a speed comes later than pressures let expect; None: not shown."""
+    pressures, speed = series.corners("calliper_pressure"), _speed(series, name)
+    if pressures is None or speed is None:
+        return None
+    moving = series.known & (speed > MOVING)
+    lag = _lag(name, np.gradient(speed, 1.0 / RATE), -pressures.sum(axis=1), moving)
+    return lag and Lag(name, lag.seconds - ANSWERS, float(np.hypot(lag.sigma, ANSWERS_SIGMA)))
+
+
+def _speed(series: InputSeries, name: str) -> Vector | None:
+    """Return the car's speed by an input [m/s], wheels of about `RADIUS`; None: it is not there."""
+    wheels = series.corners(name)
+    if wheels is not None:
+        return np.asarray(np.median(wheels, axis=1) * RADIUS)
+    there = name in series
+    return series[name] if there else None
+
+
 def _speed_lag(series: InputSeries, accel: Vector, name: str) -> Lag | None:
     """Return by how much a speed comes later than the accelerometer; None: the drive does not show it."""
-    wheels = series.corners(name)
-    if wheels is None and name not in series:
+    wheels, speed = series.corners(name), _speed(series, name)
+    if speed is None:
         return None
-    speed = np.median(wheels, axis=1) * RADIUS if wheels is not None else series[name]
     moving = series.known & (speed > MOVING)
     brakes = np.convolve(accel < -BRAKING, np.ones(2 * BESIDE + 1), mode="same") > 0.5
     if wheels is None or _is_copied(series, moving):
