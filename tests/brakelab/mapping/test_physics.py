@@ -286,6 +286,13 @@ def test_decelerations_on_the_motors_alone_scale_no_pressure():
     assert one.factor == pytest.approx(1.0 / 3.2, rel=0.2)
 
 
+def test_brake_applications_at_the_limit_of_grip_scale_no_pressure():
+    """One in eight decelerations is stamped at ten times the pressure that it takes."""
+    stamped = ROAD.t % 20.0 > 17.5
+    one = found(series("BRAKE_PRESSURE", np.where(stamped, 10.0, 1.0) * 3.2 * BAR))["calliper_pressure_fl"]
+    assert one.factor == pytest.approx(1.0 / 3.2, rel=0.2)
+
+
 def test_a_pressure_without_a_unit_that_fits_is_taken_for_bar():
     one = found(series("BRAKE_PRESSURE", BAR))["calliper_pressure_fl"]
     assert one.factor == 1.0

@@ -6,7 +6,6 @@ import numpy as np
 
 from brakelab.arrays import Vector
 from brakelab.logs.physics.line import BRAKING, MOVING, Fit
-from brakelab.logs.physics.pressures import OVERRUN
 from brakelab.logs.physics.samples import Car
 from brakelab.mapping.candidates import best_of, by_name, unit_of
 from brakelab.mapping.motion import Found, Motion
@@ -16,7 +15,7 @@ from ecu.algorithm.estimation.zero import LARGEST_ZERO
 from ecu.contract.signals import CORNERS
 
 READS_AS_BAR: Final = 1.25  # and its inverse: of a scale that friction explains
-APPLIED: Final = 0.3  # of the greatest pressure
+PARTS: Final = 12  # of the braking, by pressure
 GAINS: Final = 0.2  # m/s^2, of a car whose brakes are released
 BACKWARDS: Final = 8.0  # m/s; nobody reverses faster. Assumption
 SELDOM: Final = 0.1  # of a drive, that ABS or ESP may act
@@ -105,15 +104,29 @@ def _without_unit(each: list[Series], zeros: Vector, motion: Motion, car: Car) -
         return 1.0, f"{unitless}, taken for bar: friction is off by its scale; --config CONFIG shows more"
     pressures = np.stack([motion.smoothed(one) for one in each], axis=1) - zeros
     braking = motion.faster(MOVING) & (motion.change < -BRAKING)
-    applied = pressures.sum(axis=1)  # not by motors alone
-    braking &= applied > APPLIED * np.percentile(applied[motion.faster(MOVING)], 99)
-    expected = float((pressures[braking] @ car.brakes.decel_per_bar).sum())
-    decel = float((-motion.change[braking] - OVERRUN).sum())
-    factor = decel / expected if expected > 0.0 else 1.0
+    braking &= pressures.sum(axis=1) > 0.0
+    factor = _slope(pressures[braking] @ car.brakes.decel_per_bar, -motion.change[braking])
     if 1.0 / READS_AS_BAR < factor < READS_AS_BAR:
         return 1.0, f"{unitless}, taken for bar, as which it fits CONFIG's brakes"
     factor = float(f"{factor:.3g}")
     return factor, f"{unitless}; factor {factor:g} is what CONFIG's brakes need: friction is relative to it"
+
+
+def _slope(expected: Vector, decel: Vector) -> float:
+    """Return the deceleration over the `expected` one, 1 where the drive does not tell it.
+
+    The median of the slopes between parts of the drive: motors add to the lightest of them, grip is missing
+    in the hardest.
+    """
+    if len(expected) < PARTS:
+        return 1.0
+    parts = np.array_split(np.argsort(expected), PARTS)
+    x, y = (np.array([np.median(values[part]) for part in parts]) for values in (expected, decel))
+    low, high = np.triu_indices(PARTS, 1)
+    apart = x[high] - x[low]
+    slopes = (y[high] - y[low])[apart > 0.0] / apart[apart > 0.0]
+    factor = float(np.median(slopes)) if len(slopes) else 1.0
+    return factor if factor > 0.0 else 1.0
 
 
 def flags(series: list[Series], motion: Motion) -> list[Found]:
