@@ -7,7 +7,7 @@ import pytest
 from brakelab.logs.signal_file import freshness_at_any_rate
 from brakelab.replay.needed import fault_lines, needed_lines, request_line, transducer_line
 from brakelab.replay.quality import Findings
-from ecu.contract.faults import PEDAL_LOST, PRESSURE_LOST, WHEEL_SPEED_LOST
+from ecu.contract.faults import IMU_LOST, PEDAL_LOST, PRESSURE_LOST, WHEEL_SPEED_LOST
 from ecu.contract.signals import CORNERS, INPUT
 
 WHEELS = [f"wheel_speed_{corner}" for corner in CORNERS]
@@ -69,6 +69,21 @@ def test_one_speed_stands_for_wheels_that_are_not_mapped() -> None:
         (line,) = needed_lines(found)
         assert says in line
         assert fault_lines(found) == []
+
+
+@pytest.mark.parametrize(
+    ("names", "by_fault", "said"),
+    [
+        (WHEELS, {IMU_LOST: 990}, []),
+        ([*WHEELS, "accel_x"], {IMU_LOST: 990}, ["99 % of the drive: IMU lost (99 %)"]),
+        (["accel_x"], {WHEEL_SPEED_LOST: 990, IMU_LOST: 5}, ["0.05 s of the drive: IMU lost (0.05 s)"]),
+    ],
+)
+def test_what_is_not_mapped_is_no_fault_and_blames_no_other(names, by_fault, said) -> None:
+    found = came(*names, "calliper_pressure_fl")
+    found.faulty_rows = 990
+    found.fault_rows.update(by_fault)
+    assert fault_lines(found) == [f"d.log: degraded or failed for {one}" for one in said]
 
 
 @pytest.mark.parametrize(

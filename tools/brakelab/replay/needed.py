@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.replay.quality import Findings
-from ecu.contract.faults import DEGRADING, FAULTS, PRESSURE_LOST, REQUEST_LOST, WHEEL_SPEED_LOST
+from ecu.contract.faults import DEGRADING, FAULTS, IMU_LOST, PRESSURE_LOST, REQUEST_LOST, WHEEL_SPEED_LOST
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import (
     ACCEL_X,
@@ -135,7 +135,10 @@ def nothing_usable(logs: Sequence[Findings]) -> bool:
 
 
 def fault_lines(found: Findings) -> list[str]:
-    """Return a line that names the faults that degraded or failed the ECU in this log, and how long."""
+    """Return a line that names the faults that degraded or failed the ECU in this log, and how long.
+
+    What is not mapped is reported elsewhere; beside it counts how long the longest of the others lasted.
+    """
     if not found.faulty_rows:
         return []
 
@@ -145,6 +148,7 @@ def fault_lines(found: Findings) -> list[str]:
 
     reported = 0 if has_pressure(found) else PRESSURE_LOST
     reported |= 0 if found.mapped[list(WHEELS)].any() else WHEEL_SPEED_LOST
+    reported |= 0 if found.mapped[ACCEL_X] else IMU_LOST
     causes = [fault for fault in FAULTS if fault.bit & (DEGRADING | REQUEST_LOST) & ~reported]
     lasting = sorted(causes, key=lambda fault: -found.fault_rows[fault.bit])
     names = [
@@ -154,9 +158,9 @@ def fault_lines(found: Findings) -> list[str]:
     ]
     if not names:
         return []
-    return [
-        f"{found.path}: degraded or failed for {extent(found.faulty_rows)} of the drive: {', '.join(names)}"
-    ]
+    beside = any(found.fault_rows[fault.bit] for fault in FAULTS if fault.bit & reported)
+    rows = found.fault_rows[lasting[0].bit] if beside else found.faulty_rows
+    return [f"{found.path}: degraded or failed for {extent(rows)} of the drive: {', '.join(names)}"]
 
 
 def _cause(found: Findings, place: int) -> str:
