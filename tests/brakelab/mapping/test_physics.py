@@ -330,8 +330,11 @@ def test_a_pressure_is_no_pedal():
     assert "pedal_position" not in inputs
 
 
-def test_a_pedal_in_per_cent_keeps_its_scale():
-    assert found(series("BrakePedalPos", 8.0 * BAR, "%"))["pedal_position"].factor == 1.0
+@pytest.mark.parametrize("name", ["BrakePedalPos", "Brake_Percent"])
+def test_a_pedal_in_per_cent_keeps_its_scale_and_is_no_pressure(name):
+    inputs = found(series(name, 8.0 * BAR, "%"))
+    assert inputs["pedal_position"].factor == 1.0
+    assert "calliper_pressure_fl" not in inputs
 
 
 def test_states_are_no_pedal_position():

@@ -38,22 +38,15 @@ def best_of(
     unit = contract_unit(target)
     fitting: list[tuple[float, Series, Fit]] = []
     for one in series:
-        points = score(one.signal, target)
-        if (
-            one.flag
-            or points < 0
-            or not (converts(one.unit, unit) or (counts(one.unit, unit) and points >= 1))
-        ):
+        points, pressure = score(one.signal, target), tells_pressure(one.message, one.signal)
+        counting = counts(one.unit, unit) and (pressure or not one.unit.strip())
+        if one.flag or points < 0 or not (converts(one.unit, unit) or (counting and points >= 1)):
             continue
         if (unit == "%" and points < 1) or len(np.unique(one.value)) <= STEPS:
             continue
         found = fit(motion.smoothed(one), reference, rows & motion.near(one))
         strength = found.correlation * fixed_sign if fixed_sign else abs(found.correlation)
-        said = (
-            not counts(one.unit, unit)
-            or unit == "%"
-            or (unit == "bar" and tells_pressure(one.message, one.signal))
-        )
+        said = not counting or unit == "%" or (unit == "bar" and pressure)
         named = points > 0 and said
         least = LEAST_CORRELATION if named else LEAST_ALONE
         if not strength >= least:
