@@ -27,7 +27,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import fresh
-from ecu.algorithm.lag import lag_gain
+from ecu.algorithm.lag import lag_gain, settled
 from ecu.contract.params import BAR, FALL, RISE
 from ecu.contract.signals import CALLIPER_PRESSURE, CYCLE_NS
 from ecu.jit import Record, kernel
@@ -187,8 +187,8 @@ def _advance_half_cycle(
     pull = 2.0 * half / inertia * (target - state.model[i])
     rate = (state.rate[i] * (1.0 - weight) + pull) / (1.0 + weight)
     rate = min(max(rate, -params.pressure_rate[FALL]), params.pressure_rate[RISE])
-    state.model[i] += half * (state.rate[i] + rate)
-    state.rate[i] = rate
+    state.model[i] = settled(state.model[i] + half * (state.rate[i] + rate))
+    state.rate[i] = settled(rate)
 
 
 @kernel

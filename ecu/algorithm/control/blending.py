@@ -24,7 +24,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import current, fresh, others_brake, usable
-from ecu.algorithm.lag import lag_gain
+from ecu.algorithm.lag import lag_gain, settled
 from ecu.contract.signals import MOTOR_LIMIT, MOTOR_TORQUE, REVERSE
 from ecu.jit import Record, kernel
 
@@ -79,7 +79,7 @@ def _follow_limit(state: Record, inputs: Record, fading: float, ahead_s: float, 
     limit: float = inputs.value[MOTOR_LIMIT + i]
     if fresh(inputs, MOTOR_LIMIT + i):
         fall = max((state.limit[i] - limit) / dt, 0.0)
-        state.fall[i] = max(fall, state.fall[i] + RATE_GAIN * (fall - state.fall[i]))
+        state.fall[i] = max(fall, settled(state.fall[i] + RATE_GAIN * (fall - state.fall[i])))
         state.limit[i] = limit
     state.ceiling[i] = max(limit - dt * state.fall[i], 0.0)
     ahead = max(min(limit - ahead_s * state.fall[i], fading * limit), 0.0)
@@ -151,15 +151,16 @@ def share_torque(params: Record, state: Record, torque: Record, slowness: float,
         slowness: of the hydraulics.
         dt: time since the last cycle [s].
     """
+    gain = lag_gain(dt, LATER_S * slowness)
     for i in range(4):
         demand = max(torque[i], 0.0) if math.isfinite(torque[i]) else 0.0
         rise = max((demand - state.torque[i]) / dt, 0.0) if dt > 0.0 else 0.0
-        state.rise[i] += RATE_GAIN * (rise - state.rise[i])
+        state.rise[i] = settled(state.rise[i] + RATE_GAIN * (rise - state.rise[i]))
         state.torque[i] = demand
         allowed = max(state.allowed[i] - AHEAD * slowness * state.rise[i], 0.0)
         plan = min(params.blending[i] * demand, allowed)
         later = LATER * max(state.slow[i] - plan, 0.0)
-        state.slow[i] += lag_gain(dt, LATER_S * slowness) * (plan - state.slow[i])
+        state.slow[i] = settled(state.slow[i] + gain * (plan - state.slow[i]))
         state.plan[i] = min(plan + later, demand)
         state.lining[i] = torque[i] - state.plan[i]
         if demand == 0.0:

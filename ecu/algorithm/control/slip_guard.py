@@ -43,7 +43,7 @@ import numpy as np
 
 from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.inputs import fresh, usable
-from ecu.algorithm.lag import lag_gain
+from ecu.algorithm.lag import lag_gain, settled
 from ecu.algorithm.monitoring.plausibility import SECOND_DIFFERENCE
 from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.params import BAR
@@ -304,7 +304,8 @@ def guard_slip(
         _follow_lag(params, state, inputs, ground, braking, i, dt)
         per_torque, radius = 1.0 / (brake_gain(params, i) * params.mu_nominal[i]), params.wheel_radius[i]
         presses = BAR * pressure[i] + per_torque * motor[i]
-        state.pressed[i] += lag_gain(dt, PRESSED_LAG) * (presses - state.pressed[i])
+        late = lag_gain(dt, PRESSED_LAG) * (presses - state.pressed[i])
+        state.pressed[i] = settled(state.pressed[i] + late)
         base, lag = max(ground, LEAST_SPEED), state.lag[i]
         far = watching and lag > RANGE * base
         if not (far or state.capped[i]):

@@ -16,7 +16,7 @@ import numpy as np
 
 from ecu.algorithm.brake import brake_gain
 from ecu.algorithm.inputs import motor_torque, others_brake, usable
-from ecu.algorithm.lag import lag_gain
+from ecu.algorithm.lag import lag_gain, settled
 from ecu.contract.params import BAR, GRAVITY
 from ecu.contract.signals import CALLIPER_PRESSURE
 from ecu.jit import Record, kernel
@@ -82,7 +82,7 @@ def watch_brakes(
     due, total, suspected, braked = 0.0, 0.0, 0.0, False
     for i in range(4):
         force = lining_force(params, law, expected[i], i)
-        state.owed[i] += gain * (force - state.owed[i])
+        state.owed[i] = settled(state.owed[i] + gain * (force - state.owed[i]))
         given -= motor_torque(inputs, i) / params.wheel_radius[i]
         due += force
         total += state.owed[i]

@@ -2,6 +2,7 @@
 finite is survived and reported, and the cycle allocates nothing."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -446,6 +447,28 @@ def test_after_missed_periods_one_step_covers_the_time(params, feed, missed: int
     rows = car.drive((60.0, 1.0))
     assert column(rows, "vehicle_speed")[-1] == pytest.approx(car.speed, abs=0.3)
     assert np.isfinite(rows[:, PROMISED]).all()
+
+
+def _values(record: np.ndarray, name: str) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the real numbers of a record by the names of their fields."""
+    for field in record.dtype.names or ():
+        yield from _values(record[field], f"{name}.{field}")
+    if record.dtype.kind == "f":
+        yield name, record
+
+
+def test_nothing_decays_for_ever(car: Car) -> None:
+    """Numbers that are nearly zero and not normal take a processor a hundred times as long."""
+    car.params["blending"] = 0.5
+    car.overwrite = dict.fromkeys((f"motor_limit_{corner}" for corner in CORNERS), 500.0)
+    car.drive((0.0, 1.0), (40.0, 2.0))
+    car.overwrite = dict.fromkeys(car.overwrite, 0.0)
+    car.drive((40.0, 0.5), (0.0, 40.0))
+    least = np.finfo(np.float64).tiny
+    small = {
+        name for name, value in _values(car.state, "state") if ((value != 0) & (abs(value) < least)).any()
+    }
+    assert not small
 
 
 @pytest.mark.requirement("REQ-LOOP-2")
