@@ -34,6 +34,7 @@ from ecu.jit import Record, kernel
 
 LONGEST_DEAD_TIME = 0.3  # s
 CYCLE = 1e-9 * CYCLE_NS
+HALF = 0.25 * CYCLE  # s, of a half cycle
 KEPT = round(LONGEST_DEAD_TIME / CYCLE) + 1  # demands
 
 HYDRAULICS_STATE = np.dtype(
@@ -54,6 +55,8 @@ HYDRAULICS_STATE = np.dtype(
     align=True,
 )
 
+Response = tuple[int, float, float]
+"""To a rise or a fall: dead time in half cycles, weights of the rate and of what is missing [1/s]."""
 LONGEST_GAP = 100  # cycles
 WALK = 0.1  # bar/sqrt(s)
 RELEASED = 0.5  # bar
@@ -177,37 +180,35 @@ def _delayed(state: Record, i: int, half_cycles: int) -> float:
 
 
 @kernel
+def _response(params: Record, state: Record, direction: int) -> Response:
+    slow = stretch(params, state, direction)
+    inertia = slow * slow * params.pressure_inertia[direction]
+    lag = slow * params.pressure_lag[direction]
+    dead = _half_cycles(slow * params.dead_time[direction])
+    return dead, HALF * (lag + HALF) / inertia, 2.0 * HALF / inertia
+
+
+@kernel
 def _advance_half_cycle(
-    params: Record, state: Record, i: int, target: float, slow: tuple[float, float]
+    params: Record, state: Record, i: int, target: float, rise: Response, fall: Response
 ) -> None:
-    direction = FALL if target < state.model[i] else RISE
-    inertia = slow[direction] * slow[direction] * params.pressure_inertia[direction]
-    lag, half = slow[direction] * params.pressure_lag[direction], 0.25 * CYCLE
-    weight = half * (lag + half) / inertia
-    pull = 2.0 * half / inertia * (target - state.model[i])
-    rate = (state.rate[i] * (1.0 - weight) + pull) / (1.0 + weight)
+    _, weight, pull = fall if target < state.model[i] else rise
+    rate = (state.rate[i] * (1.0 - weight) + pull * (target - state.model[i])) / (1.0 + weight)
     rate = min(max(rate, -params.pressure_rate[FALL]), params.pressure_rate[RISE])
-    state.model[i] = settled(state.model[i] + half * (state.rate[i] + rate))
+    state.model[i] = settled(state.model[i] + HALF * (state.rate[i] + rate))
     state.rate[i] = settled(rate)
 
 
 @kernel
-def _stretches(params: Record, state: Record) -> tuple[float, float]:
-    """Return the factors on the unit's times of a rise and a fall."""
-    return stretch(params, state, RISE), stretch(params, state, FALL)
-
-
-@kernel
-def _advance(params: Record, state: Record, i: int, sent: float, slow: tuple[float, float]) -> None:
-    rising = _half_cycles(slow[RISE] * params.dead_time[RISE])
-    falling = _half_cycles(slow[FALL] * params.dead_time[FALL])
+def _advance(params: Record, state: Record, i: int, sent: float, rise: Response, fall: Response) -> None:
+    rising, falling = rise[0], fall[0]
     before = state.model[i]
     state.newest[i] = state.newest[i] + 1 if state.newest[i] + 1 < KEPT else 0
     state.history[i, state.newest[i]] = sent
     for passed in (1, 2):
-        rise, fall = _delayed(state, i, rising - passed), _delayed(state, i, falling - passed)
-        target = min(rise, fall) if rising >= falling else max(rise, fall)
-        _advance_half_cycle(params, state, i, target, slow)
+        risen, fallen = _delayed(state, i, rising - passed), _delayed(state, i, falling - passed)
+        target = min(risen, fallen) if rising >= falling else max(risen, fallen)
+        _advance_half_cycle(params, state, i, target, rise, fall)
     change = state.model[i] - before
     state.value[i] += change
     state.variance[i] += WALK**2 * CYCLE + (SHARE * change) ** 2
@@ -217,9 +218,9 @@ def _advance(params: Record, state: Record, i: int, sent: float, slow: tuple[flo
 @kernel
 def advance_pressures(params: Record, state: Record, sent: Record) -> None:
     """Move the pressures on by the coming cycle; `sent` [Pa], shape (4,): the demands of the last one."""
-    slow = _stretches(params, state)
+    rise, fall = _response(params, state, RISE), _response(params, state, FALL)
     for i in range(4):
-        _advance(params, state, i, sent[i] / BAR, slow)
+        _advance(params, state, i, sent[i] / BAR, rise, fall)
 
 
 @kernel
@@ -257,10 +258,9 @@ def correct_pressures(
         dt: time since the last cycle [s].
     """
     missed = min(max(round(dt / CYCLE), 1), LONGEST_GAP) - 1
-    slow = _stretches(params, state)
+    for _ in range(missed):
+        advance_pressures(params, state, sent)
     for i in range(4):
-        for _ in range(missed):
-            _advance(params, state, i, sent[i] / BAR, slow)
         place = CALLIPER_PRESSURE + i
         if fresh(inputs, place):
             _correct(state, i, inputs.value[place] - zero[i], params.sigma_pressure / BAR, dt)
