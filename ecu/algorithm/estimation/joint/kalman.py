@@ -101,7 +101,7 @@ def _list_corrected(free: Record, order: Record, only_speed: bool) -> int:
     count = 0
     for i in range(N):
         order[count] = order[N - 1 - i + count] = i
-        count += (free[i] != 0) & ((not only_speed) | (i == V) | (i == SLOPE))
+        count += free[i] & ((i == V) | (i == SLOPE)) if only_speed else free[i]
     return count
 
 
