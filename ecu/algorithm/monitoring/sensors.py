@@ -48,7 +48,15 @@ from ecu.contract.faults import (
     WHEEL_SPEED_IMPLAUSIBLE,
 )
 from ecu.contract.records import WATCHED
-from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, MOTOR_TORQUE, VEHICLE_SPEED, WHEEL_SPEED
+from ecu.contract.signals import (
+    ACCEL_X,
+    CALLIPER_PRESSURE,
+    HYDRAULIC_READY,
+    MOTOR_TORQUE,
+    USABLE,
+    VEHICLE_SPEED,
+    WHEEL_SPEED,
+)
 from ecu.jit import Record, kernel
 
 ACCEL_X_DRIFTED = IMPLAUSIBLE["accel_x"]
@@ -159,10 +167,11 @@ def mask_implausible(p: Record, s: Record, u: Record) -> None:
     u.age_ns[VEHICLE_SPEED] += int(1e9 * reference_lag(s.speeds.lateness))
     if abs(u.value[ACCEL_X]) > p.accel_range:
         _distrust(s, u, ACCEL_X)
+    heard = _hydraulics_heard(u)
     for i in range(4):
         if s.plausibility.fell[i]:
             _distrust(s, u, WHEEL_SPEED + i)
-        _mask_pressure(s, u, i, others_brake(u))
+        _mask_pressure(s, u, i, heard, others_brake(u))
 
 
 @kernel
@@ -179,20 +188,34 @@ def _mask_contradicted(s: Record, u: Record) -> None:
 
 
 @kernel
-def _mask_pressure(s: Record, u: Record, i: int, others: bool) -> None:
-    """Overwrite a pressure by the model's where it is wrong, less what lasts where it is not."""
+def _hydraulics_heard(u: Record) -> bool:
+    """Return whether the hydraulic unit, which executes the demands, is alive: any of its signals is."""
+    heard = usable(u, HYDRAULIC_READY)
+    for i in range(CALLIPER_PRESSURE, CALLIPER_PRESSURE + 4):
+        heard = heard or usable(u, i)
+    return heard
+
+
+@kernel
+def _mask_pressure(s: Record, u: Record, i: int, heard: bool, others: bool) -> None:
+    """Overwrite a pressure by the model's where it is wrong or lost, less what lasts where it is not."""
     place, model = CALLIPER_PRESSURE + i, s.hydraulics.model[i]
-    if not s.plausibility.sent or s.failed_brakes.failed[i] or not usable(u, place):
+    lost = not usable(u, place)
+    if not s.plausibility.sent or s.failed_brakes.failed[i] or (lost and not heard):
         return
     if others:
-        if s.pressures.wrong[i]:
+        if s.pressures.wrong[i] and not lost:
             _distrust(s, u, place)
     elif (
-        s.pressures.wrong[i]
+        lost
+        or s.pressures.wrong[i]
         or s.plausibility.apart_s[i] > LEFT_OUT_S
         or beyond_noise(s.pressures, u.value[place] - s.estimate.pressure_zero[i], model)
     ):
         u.value[place] = model + s.estimate.pressure_zero[i]
+        u.verdict[place] |= USABLE
+        if lost:
+            u.new[place], u.age_ns[place] = 1, 0
         leave_out(s.witness, place)
     elif not s.pressures.honest:
         reading = u.value[place] - lasting_difference(s.pressures, i, model)

@@ -1,0 +1,48 @@
+"""What an input that is lost costs: friction is learned on."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from brakelab.simulation.closed_loop import Drive, new_loop, run
+from brakelab.simulation.configured import configured
+from brakelab.simulation.scenario import Scenario
+from brakelab.stretches import stretches
+from brakelab.studies.lies_cell import brake_force
+from ecu.contract.faults import PRESSURE_LOST, fault_mask
+from ecu.contract.signals import CORNERS
+
+DECEL, LOWEST_SPEED = 4.0, 5.0  # m/s^2, m/s
+FRONT, REAR = CORNERS[:2], CORNERS[2:]
+
+
+@cache
+def drive(lost: tuple[str, ...], friction: int, brakings: int = 8) -> Drive:
+    """Brake from 25 m/s by linings of `friction` [%]; the pressures of `lost` corners are lost at once."""
+    phases = [{"kind": "coast", "seconds": 2.5}]
+    for _ in range(brakings):
+        phases += [
+            {"kind": "brake", "decel": DECEL, "until_speed": 3.0},
+            {"kind": "cruise", "speed": 26.0, "accel": 4.0, "until_speed": 25.0},
+        ]
+    signals = [f"calliper_pressure_{corner}" for corner in lost]
+    faults = [{"kind": "invalid", "t": 2.0, "signal": signals}] if lost else []
+    car = {"friction_scale_front": f"{friction} %", "friction_scale_rear": f"{friction} %"}
+    content = {"plant": "suv", "initial_speed": 25.0, "phase": phases, "fault": faults, "car": car}
+    return run(new_loop(Scenario.model_validate(content), configured("suv"), 1))
+
+
+def last_force(found: Drive) -> float:
+    """Return the mean force of linings and motors in the last braking over what is demanded."""
+    on = (found.truth["decel_demand"] > 0.9 * DECEL) & (found.truth["vehicle_speed"] > LOWEST_SPEED)
+    begin, end = [row for row in stretches(on).tolist() if row[1] - row[0] > 100][-1]
+    return float(np.mean(brake_force(found, configured("suv").vehicle.mass)[begin + 60 : end])) / DECEL
+
+
+@pytest.mark.parametrize("friction", [75, 120])
+@pytest.mark.parametrize("lost", [CORNERS[:1], FRONT, REAR, CORNERS], ids=["one", "front", "rear", "all"])
+def test_without_pressures_friction_is_learned_by_those_that_are_demanded(lost, friction) -> None:
+    found = drive(lost, friction)
+    assert int(fault_mask(found.outputs)[-1]) & PRESSURE_LOST
+    assert last_force(found) == pytest.approx(last_force(drive((), friction)), rel=0.03)
