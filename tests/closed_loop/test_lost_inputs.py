@@ -1,4 +1,4 @@
-"""What an input that is lost costs: friction is learned on."""
+"""What an input that is lost, or found wrong, costs: friction is learned on, and the speed is taken back."""
 
 from functools import cache
 
@@ -10,7 +10,7 @@ from brakelab.simulation.configured import configured
 from brakelab.simulation.scenario import Scenario
 from brakelab.stretches import stretches
 from brakelab.studies.lies_cell import brake_force
-from ecu.contract.faults import PRESSURE_LOST, fault_mask
+from ecu.contract.faults import IMPLAUSIBLE, PRESSURE_LOST, fault_mask
 from ecu.contract.signals import CORNERS
 
 DECEL, LOWEST_SPEED = 4.0, 5.0  # m/s^2, m/s
@@ -46,3 +46,17 @@ def test_without_pressures_friction_is_learned_by_those_that_are_demanded(lost, 
     found = drive(lost, friction)
     assert int(fault_mask(found.outputs)[-1]) & PRESSURE_LOST
     assert last_force(found) == pytest.approx(last_force(drive((), friction)), rel=0.03)
+
+
+@pytest.mark.parametrize("phase", range(5))
+@pytest.mark.parametrize("reads", [0.0, 60.0])
+def test_a_speed_over_ground_that_is_found_wrong_has_not_moved_the_car_s(reads: float, phase: int) -> None:
+    """It jumps in a braking, at any cycle of a window of the observer."""
+    fault = {"kind": "set", "t": 5.0 + 0.01 * phase, "signal": ["vehicle_speed"], "amount": reads}
+    phases = [{"kind": "coast", "seconds": 3.0}, {"kind": "brake", "decel": DECEL, "until_speed": 3.0}]
+    content = {"plant": "suv", "initial_speed": 28.0, "phase": phases, "fault": [fault]}
+    content["vehicle_speed"] = "optical"
+    found = run(new_loop(Scenario.model_validate(content), configured("suv"), 1))
+    after = (found.t > 5.3) & (found.truth["vehicle_speed"] > LOWEST_SPEED)
+    assert fault_mask(found.outputs)[after].astype(int)[0] & IMPLAUSIBLE["vehicle_speed"]
+    assert np.abs(found.outputs["vehicle_speed"] - found.truth["vehicle_speed"])[after].max() < 0.5

@@ -22,7 +22,7 @@ from ecu.algorithm.estimation.joint.prediction import (
 from ecu.algorithm.estimation.joint.prior import begin_application, end_application, forget_levels
 from ecu.algorithm.estimation.joint.sliding import suspend_learning
 from ecu.algorithm.estimation.joint.snapshot import keep_calm_snapshot, take_calm_snapshot
-from ecu.algorithm.estimation.joint.speed import doubt_speed
+from ecu.algorithm.estimation.joint.speed import doubt_speed, retake_speed
 from ecu.algorithm.estimation.joint.whole_application import (
     add_coasting,
     add_to_whole,
@@ -34,6 +34,7 @@ from ecu.algorithm.estimation.joint.whole_application import (
     torques_measured,
 )
 from ecu.algorithm.estimation.joint.whole_filter import forget_filter, keep_filter
+from ecu.algorithm.estimation.joint.window import open_window
 from ecu.algorithm.estimation.motion import tell_motion, update_motion
 from ecu.algorithm.estimation.thesis.estimates import tell_friction, tell_wheels
 from ecu.algorithm.estimation.thesis.force import reset_force, take_measured_force, update_force
@@ -163,8 +164,12 @@ def _observe_jointly(
         take_calm_snapshot(joint)
     if guarded or contradicted:
         suspend_learning(joint)
-    if contradicted and s.motion.measured == 0:
-        doubt_speed(p, joint, u)
+    if contradicted:
+        open_window(joint)  # what it has is also of the input that is wrong
+        if s.motion.measured == 0:
+            doubt_speed(p, joint, u)
+        elif s.speeds.started:
+            retake_speed(joint, s.speeds.reckoned)
     update_joint(p, joint, u, s.motion, s.wheel_load.load, s.hydraulics, braking, dt)
     if joint.closed and joint.kept_s == 0.0 and s.witness.calm:
         keep_calm_snapshot(joint)

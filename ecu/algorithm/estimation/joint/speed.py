@@ -89,6 +89,14 @@ def doubt_speed(params: Record, state: Record, inputs: Record) -> None:
 
 
 @kernel
+def retake_speed(state: Record, reckoned: float) -> None:
+    """Take the dead `reckoned` speed [m/s] where an input that is now found wrong has misled the filter."""
+    if abs(reckoned - state.x[V]) > MISLED * reckoned:
+        state.x[V] = reckoned
+        forget_speed(state)
+
+
+@kernel
 def _driven(inputs: Record, accel: float) -> bool:
     total = 0.0
     for i in range(4):
