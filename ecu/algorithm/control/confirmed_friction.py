@@ -18,11 +18,17 @@ d is what the accelerometer has moved by against the wheels of late (c of `accel
 road. A negative d counts against a rise: two witnesses, accelerometer and wheels, must confirm what lowers
 the pressure. A positive one counts where friction is lowered beyond what was confirmed. On a road that falls
 away a true rise waits until d is usual, and the car brakes the harder for it.
+
+While the accelerometer is left out, the wheels' deceleration stands for a, less the slope of before, c, where
+that counts against a rise. What was taken below the confirmed friction on its word is given again at once;
+until any was confirmed c is not known, and no rise is followed.
 """
 
 import numpy as np
 
 from ecu.algorithm.lag import lag_gain
+from ecu.algorithm.monitoring.acceleration import rolled_accel
+from ecu.algorithm.vehicle import tyre_slip
 from ecu.contract.params import GRAVITY
 from ecu.jit import Record, kernel
 
@@ -63,6 +69,7 @@ def confirm_friction(
     estimate: Record,
     used: Record,
     accel_offset: float,
+    blocks: Record,
     decel: float,
     calm: bool,
     slowness: float,
@@ -76,13 +83,19 @@ def confirm_friction(
         estimate: `ESTIMATE` of this cycle.
         used: friction in use, shape (4,).
         accel_offset: c, the accelerometer's difference from the wheels [m/s^2].
+        blocks: `ACCELERATION_STATE`, for the acceleration of the wheels.
         decel: demanded [m/s^2], NaN: unknown.
         calm: the ECU alone brakes, forwards, no wheel or axle is held back and no brake has failed.
         slowness: of the hydraulics.
         dt: time since the last cycle [s].
     """
-    state.excess = 0.0
-    state.usual += (accel_offset - state.usual) * min(dt / USUAL_S, 1.0)
+    state.excess, measured, known = 0.0, estimate.measured != 0, state.friction[0] > 0.0
+    accel, drifted = estimate.accel_x, accel_offset - state.usual
+    if not measured:
+        rolled = rolled_accel(blocks)
+        accel, drifted = rolled * (1.0 + tyre_slip(params, rolled)) + max(state.usual, 0.0), 0.0
+    else:
+        state.usual += (accel_offset - state.usual) * min(dt / USUAL_S, 1.0)
     if not decel > LEAST_DECEL:
         state.asked = state.given = state.steady_s = 0.0
         state.pressed = state.followed = 1.0
@@ -90,25 +103,24 @@ def confirm_friction(
     resistance = params.drag_area * estimate.speed**2 / params.mass + params.rolling_resistance * GRAVITY
     gain = lag_gain(dt, LAG)
     state.asked += gain * (decel - state.asked)
-    state.given += gain * (-estimate.accel_x - resistance - state.given)
+    state.given += gain * (-accel - resistance - state.given)
     state.pressed += lag_gain(dt, USUAL_LATENESS * slowness + TYRES) * (state.in_use - state.pressed)
     state.followed += gain * (state.pressed - state.followed)
-    moves = estimate.speed > LEAST_SPEED and estimate.measured != 0
+    moves = (measured or known) and estimate.speed > LEAST_SPEED
     steady = calm and moves and abs(decel - state.asked) < STEADY * decel
     state.steady_s = state.steady_s + dt if steady else 0.0
-    if estimate.measured == 0:  # left out: nobody confirms a rise, and nothing is taken on its word
-        state.back += min(max(1.0 - state.back, -TAKE * dt), TAKE * dt)
+    if not measured:
+        state.back += min(max(1.0 - state.back, -TAKE * dt), 0.0 if known else TAKE * dt)
     if state.steady_s < SETTLED_S * max(slowness, 1.0):
         return
     state.excess = max(state.given / (TOO_MUCH * state.asked) - 1.0, 0.0)
-    drifted = accel_offset - state.usual
     if state.back >= 1.0:
         drifted = max(drifted, 0.0)
     else:
-        drifted = min(drifted, 0.0) if state.friction[0] > 0.0 else 0.0
+        drifted = min(drifted, 0.0) if known else 0.0
     share = (state.given + drifted) / state.asked
     coming, width = share, WIDTH
-    if state.friction[0] == 0.0:
+    if not known:
         coming, width = share * state.heading / state.followed, FIRST_WIDTH
     missing = (AGREES if state.back > 0.0 else LEAST_SHARE) - coming
     if state.back > 1.0 or (state.back == 1.0 and missing > 0.0):
@@ -119,10 +131,9 @@ def confirm_friction(
     else:
         state.back = max(state.back - (GIVE_FAST if coming > OVER else GIVE) * dt, 0.0)
     if state.back == 0.0 and state.excess == 0.0 and share > CONFIRMS:
-        if state.friction[0] == 0.0:
+        if not known:
             state.usual = accel_offset  # of the road that the first braking was on
         for i in range(4):
-            known = state.friction[i] > 0.0
             state.friction[i] += (used[i] - state.friction[i]) * (dt / FOLLOW_S if known else 1.0)
 
 

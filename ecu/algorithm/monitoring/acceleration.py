@@ -181,6 +181,13 @@ def _wheels_accel(mean: Record, j: int) -> float:
 
 
 @kernel
+def rolled_accel(state: Record) -> float:
+    """Return d(omega r)/dt over the last blocks, of all wheels [m/s^2]; 0 without two of them."""
+    mean = state.mean
+    return float((mean[0, ROLLED] - mean[2, ROLLED]) / (2.0 * BLOCK_S))
+
+
+@kernel
 def _beside_wheels(mean: Record, j: int) -> float:
     """Return a - dv/dt now, v in column `j` [m/s^2]."""
     return _now(mean, A) - _wheels_accel(mean, j)
