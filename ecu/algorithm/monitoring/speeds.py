@@ -49,7 +49,7 @@ from ecu.algorithm.monitoring.lateness import (
 )
 from ecu.algorithm.monitoring.witness import judge
 from ecu.algorithm.vehicle import corner_speed, tyre_slip
-from ecu.contract.signals import ACCEL_X, VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
+from ecu.contract.signals import VEHICLE_SPEED, VEHICLE_SPEED_VALID, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
 SPEED, RECKONED = 4, 5
@@ -175,11 +175,9 @@ def _wheels_spin(state: Record, median: float, speed: float) -> bool:
 
 
 @kernel
-def _reckon(
-    state: Record, witness: Record, inputs: Record, accel: float, median: float, left: bool, dt: float
-) -> None:
+def _reckon(state: Record, witness: Record, estimate: Record, median: float, left: bool, dt: float) -> None:
     """Advance dead reckoning; without an accelerometer it is the median. `left`: see `_wheels_left`."""
-    if not (state.started and usable(inputs, ACCEL_X)):
+    if not (state.started and estimate.measured):
         state.reckoned, state.slope, state.started = median, 0.0, 1
         return
     reach = RECKON_REACH * max(median, LEAST_SPEED)
@@ -189,7 +187,7 @@ def _reckon(
         if not (abs(innovation) < LEAVES * state.reckoned) or witness.rejected[VEHICLE_SPEED]:
             innovation = 0.0
     state.slope -= SLOPE_RECKON * dt * innovation
-    state.reckoned += (accel - state.slope + RECKON * innovation) * dt
+    state.reckoned += (estimate.accel_x - state.slope + RECKON * innovation) * dt
 
 
 @kernel
@@ -286,7 +284,7 @@ def watch_speeds(
     drives = accelerates
     for i in range(4):
         drives = drives or motor_torque(inputs, i) < -TORQUE
-    seen = usable(inputs, ACCEL_X) and not estimate.backwards and dt < OVERSLEPT_S
+    seen = estimate.measured != 0 and not estimate.backwards and dt < OVERSLEPT_S
     carry_speeds(params, state.carried, state.implied, accel, seen, dt)
     if _over_ground_tells(state, witness, braked, drives):
         median = state.implied[SPEED]
@@ -302,7 +300,7 @@ def watch_speeds(
         if seen and wheels_confirmed(state.carried):
             judge(witness, VEHICLE_SPEED, state.implied[SPEED] - median, SPINS_BY, DOUBT_S, dt)
         return
-    _reckon(state, witness, inputs, accel, median, left, dt)
+    _reckon(state, witness, estimate, median, left, dt)
     if begins and drives:
         state.reckoned = estimate.speed
     free = not accelerates and accel > DRAGGED_ACCEL

@@ -60,14 +60,15 @@ def _calm(state: Record, inputs: Record) -> bool:
     """Return whether the accelerometer has stood still beside the last two samples and this one."""
     least = min(state.accel[0], min(state.accel[1], inputs.value[ACCEL_X]))
     most = max(state.accel[0], max(state.accel[1], inputs.value[ACCEL_X]))
-    calm: bool = usable(inputs, ACCEL_X) and most - least < CALM
+    calm: bool = most - least < CALM
     return calm
 
 
 @kernel
 def _jumped(params: Record, state: Record, inputs: Record, estimate: Record, noise: float) -> bool:
     """Return whether all have jumped by the change before the present sample, beyond `noise` [rad/s]."""
-    if estimate.speed < LEAST_SPEED or state.took_s == 0.0 or not _calm(state, inputs):
+    sure = estimate.measured != 0 and state.took_s > 0.0 and _calm(state, inputs)
+    if estimate.speed < LEAST_SPEED or not sure:
         return False
     kick = KICK_SHARE * state.kick / params.wheel_inertia[0]
     leap = noise + (MAX_DECEL / params.wheel_radius[0] + kick) * state.took_s

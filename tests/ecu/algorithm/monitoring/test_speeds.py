@@ -19,6 +19,7 @@ class Road:
         self.params, self.feed, self.inputs = params[0], feed, feed()
         self.state, self.witness = np.zeros(1, SPEEDS_STATE)[0], np.zeros(1, WITNESS_STATE)[0]
         self.estimate = np.zeros(1, ESTIMATE)[0]
+        self.estimate["measured"] = 1
         self.speed, self.reference, self.noise = 25.0, reference, 0.0  # m/s, -, N m
         self.random = np.random.default_rng(0)
 
@@ -106,6 +107,16 @@ CASES = [
 )
 def test_who_contradicts_the_others(road, case, turns, accel, gas, seconds, rejected) -> None:
     assert road.drive(seconds, turns, accel, gas) == rejected
+
+
+@pytest.mark.parametrize("measured", [1, 0])
+def test_without_an_accelerometer_dead_reckoning_is_the_others_median(road, measured) -> None:
+    """The torques' acceleration stands for it, which knows no slope."""
+    road.estimate["measured"] = measured
+    turns = np.full(5, 0.94)
+    for _ in range(100):
+        road.drive(0.01, turns)
+    assert (road.state["reckoned"] == pytest.approx(0.94 * road.speed, rel=0.003)) == (measured == 0)
 
 
 @pytest.mark.parametrize("overslept", [0.2, 0.5])

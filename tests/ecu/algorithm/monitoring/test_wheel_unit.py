@@ -18,6 +18,7 @@ class Unit:
         self.params, self.feed, self.inputs = params[0], feed, feed()
         self.state, self.witness = np.zeros(1, WHEEL_UNIT_STATE)[0], np.zeros(1, WITNESS_STATE)[0]
         self.estimate = np.zeros(1, ESTIMATE)[0]
+        self.estimate["measured"] = 1
         self.estimate["speed"] = speed
         self.omega = speed / self.params["wheel_radius"]
         self.random = np.random.default_rng(1)
@@ -27,7 +28,6 @@ class Unit:
     ) -> bool:
         """Take a sample of each [rad/s]; return whether all are rejected."""
         self.estimate["brake_torque"], self.estimate["accel_x"] = torque, accel
-        self.estimate["measured"] = 1
         signals = {"accel_x": accel, "motor_torque": 0.0} | signals
         omega = omega + noise * self.random.standard_normal(4)
         self.feed(self.inputs, wheel_speed=omega, **signals)
@@ -82,6 +82,15 @@ def test_a_torque_that_begins_turns_all_four(params, feed, case, torque, accel, 
         unit.read(unit.omega)
     unit.read(1.03 * unit.omega, accel=0.3 * accel, motor_torque=torque)
     assert unit.read(1.03 * unit.omega, accel=accel, motor_torque=torque) == rejected, case
+
+
+def test_an_accelerometer_that_is_left_out_does_not_say_that_all_four_have_jumped(params, feed) -> None:
+    unit = Unit(params, feed, 25.0)
+    unit.estimate["measured"] = 0
+    for _ in range(50):
+        unit.read(unit.omega)
+    unit.read(1.05 * unit.omega)
+    assert not unit.read(1.05 * unit.omega)
 
 
 def test_rough_wheel_speeds_have_not_jumped(params, feed) -> None:
