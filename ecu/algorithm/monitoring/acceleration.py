@@ -33,7 +33,14 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.inputs import driver_accelerates, fresh, motor_torque, others_brake, usable
+from ecu.algorithm.inputs import (
+    driver_accelerates,
+    fresh,
+    motor_torque,
+    motor_torque_known,
+    others_brake,
+    usable,
+)
 from ecu.algorithm.monitoring.witness import compare, compare_both
 from ecu.algorithm.vehicle import tyre_slip
 from ecu.contract.params import GRAVITY
@@ -116,10 +123,11 @@ def _tells(params: Record, witness: Record, inputs: Record, speed: float) -> boo
 
 @kernel
 def _drive_known(params: Record, inputs: Record) -> bool:
-    reported = False
+    reported, known = False, params.sigma_motor_torque <= KNOWN_MOTORS
     for i in range(4):
         reported = reported or usable(inputs, MOTOR_TORQUE + i)
-    return reported and params.sigma_motor_torque <= KNOWN_MOTORS
+        known = known and motor_torque_known(inputs, i)
+    return reported and known
 
 
 @kernel

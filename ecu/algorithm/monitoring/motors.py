@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.inputs import driver_accelerates, motor_torque, others_brake, usable
+from ecu.algorithm.inputs import driver_accelerates, motor_torque, motor_torque_known, others_brake, usable
 from ecu.algorithm.lag import lag_gain
 from ecu.algorithm.monitoring.accel_error import (
     USUAL,
@@ -95,8 +95,9 @@ def watch_motors(
     speed, gain = estimate.speed, lag_gain(dt, LAG)
     resistance = params.drag_area * speed * speed / params.mass + params.rolling_resistance * GRAVITY
     reading = inputs.value[ACCEL_X] / (1.0 + GRAVITY * params.pitch_gradient)
-    error, doubt = reading + resistance, ACCEL
+    error, doubt, known = reading + resistance, ACCEL, True
     for i in range(4):
+        known = known and motor_torque_known(inputs, i)
         lever = params.wheel_radius[i] * params.mass
         lining = estimate.brake_torque[i] * base[i] / estimate.mu[i] / lever
         motor = motor_torque(inputs, i) / lever
@@ -110,7 +111,8 @@ def watch_motors(
     if apart * accel_offset > 0.0:
         apart -= math.copysign(min(abs(accel_offset), abs(apart)), apart)
     moves = speed > LEAST_SPEED and estimate.measured != 0 and estimate.backwards == 0
-    if not (moves and usable(inputs, ACCEL_X)) or others_brake(inputs) or accel_doubted(lines):
+    moves = moves and known and usable(inputs, ACCEL_X)
+    if not moves or others_brake(inputs) or accel_doubted(lines):
         return
     driven = -(state.decel[0] + state.decel[1] + state.decel[2] + state.decel[3])
     tolerance = torques_tolerance(params, lines, blocks.mean)

@@ -163,7 +163,7 @@ def mask_implausible(p: Record, s: Record, u: Record) -> None:
     What contradicts torques is masked where this ECU brakes: those of a car that others brake prove nothing.
     """
     if p.transmit:
-        _mask_contradicted(s, u)
+        _mask_contradicted(p, s, u)
     u.age_ns[VEHICLE_SPEED] += int(1e9 * reference_lag(s.speeds.lateness))
     if abs(u.value[ACCEL_X]) > p.accel_range:
         _distrust(s, u, ACCEL_X)
@@ -175,14 +175,16 @@ def mask_implausible(p: Record, s: Record, u: Record) -> None:
 
 
 @kernel
-def _mask_contradicted(s: Record, u: Record) -> None:
+def _mask_contradicted(p: Record, s: Record, u: Record) -> None:
     u.value[ACCEL_X] = correct_accel(s.accel_error, u.value[ACCEL_X])
     for place in WATCHED:
         if s.witness.rejected[place]:
             _distrust(s, u, place)
     for i in range(4):
-        if s.witness.rejected[MOTOR_TORQUE + i] and s.application.braking:
-            u.value[MOTOR_TORQUE + i] = s.blending.asked[0, i]
+        place = MOTOR_TORQUE + i
+        lost = p.blending[i] > 0.0 and not usable(u, place)
+        if s.application.braking and (lost or s.witness.rejected[place]):
+            u.value[place] = s.blending.asked[0, i]
     if s.acceleration.implausible or accel_unknown(s.accel_error):
         _distrust(s, u, ACCEL_X)
 
