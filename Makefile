@@ -10,8 +10,8 @@ PINNED := $(PIP) --no-deps --require-hashes --requirement requirements/build.txt
 
 help:
 	@echo "make demo    the ECU brakes a simulated car on a bus, in real time; a report at the end"
-	@echo "make test    every test but the studies"
-	@echo "make studies   tests that draw many cars, brakes or trips: minutes"
+	@echo "make test    what brakes a car, and each command of the laboratory once: five minutes on two cores"
+	@echo "make studies   the rest of the laboratory: many cars, laws found by search, programs of others"
 	@echo "make check   ruff, format and types"
 	@echo "make coverage  lines and branches of ecu/algorithm/control, failed_brakes.py, inputs.py and ecu/bus, kernels as plain Python: all of them"
 	@echo "make mutants   one change at a time in what brakes: which one do the tests not notice? a few minutes"
@@ -34,7 +34,7 @@ test: .venv/dev
 	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m "not study" $(ARGS)
 
 studies: .venv/dev
-	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist load -m study $(ARGS)
+	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist worksteal -m study $(ARGS)
 
 check: .venv/dev
 	.venv/bin/ruff check .

@@ -3,6 +3,10 @@
 import subprocess
 import sys
 
+import pytest
+
+pytestmark = pytest.mark.study
+
 WITHOUT = """
 import os, socket, sys
 for name in [name for name in vars(socket) if name.startswith(("AF_CAN", "PF_CAN", "CAN_"))]:

@@ -230,6 +230,33 @@ def test_a_test_is_where_its_module_is() -> None:
     assert lost == [], f"there is no module of that name; what concerns several is in {ACROSS}"
 
 
+BRAKES = ("algorithm/control", "algorithm/monitoring", "bus", "contract", "recording", "runtime", "settings")
+"""Below `tests/ecu`: `make test` runs all of them."""
+
+
+def _studies(path: Path) -> Iterator[tuple[str, str]]:
+    """Yield the tests of a file that are studies, each with its marks."""
+    tree = ast.parse((ROOT / "tests" / path).read_text("utf-8"))
+    of_all = [
+        ast.unparse(node.value)
+        for node in tree.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "pytestmark"
+    ]
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+            marks = " ".join([*of_all, *map(ast.unparse, node.decorator_list)])
+            if "pytest.mark.study" in marks:
+                yield node.name, marks
+
+
+def test_what_brakes_a_car_or_proves_a_requirement_is_no_study() -> None:
+    studies = [(path, name, marks) for path in TESTS for name, marks in _studies(path)]
+    assert len(studies) > 100
+    for path, name, marks in studies:
+        assert not path.as_posix().startswith(tuple(f"ecu/{folder}/" for folder in BRAKES)), f"{path}::{name}"
+        assert "pytest.mark.requirement" not in marks, f"{path}::{name}"
+
+
 DOCUMENTS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 

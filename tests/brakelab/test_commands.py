@@ -73,6 +73,7 @@ def test_a_table_s_columns_are_suggested(drive: Simulation) -> None:
     assert np.all(found["factor"] == 1.0)
 
 
+@pytest.mark.study
 def test_identify_gives_figures_and_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     trip = simulate("fixed-pedal", config="suv").inputs
     given = identify("vehicle", trip, config="suv", out=tmp_path / "car.toml", closed=True)

@@ -322,6 +322,7 @@ def test_a_library_holds_every_kernel_of_the_ecu_that_python_calls() -> None:
     assert _kernels_that_python_calls("ecu") <= set(done.stdout.split())
 
 
+@pytest.mark.study
 def test_the_laboratory_s_library_holds_every_kernel_that_a_command_calls() -> None:
     """Only studies, benchmarks and the parts of the plant are compiled by numba when they are called."""
     made = jit.library("brakelab")

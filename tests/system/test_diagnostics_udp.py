@@ -50,6 +50,7 @@ def server_of(unit):
     return process_of(unit, "ecu.diagnostics.process")
 
 
+@pytest.mark.study
 def test_a_foreign_tester_reads_clears_tests_and_gets_access(unit, tmp_path):
     with foreign_tester() as client:
         asked(client, lambda one: one.tester_present())
@@ -113,6 +114,7 @@ def test_a_fault_is_confirmed_kept_and_read_with_its_snapshot(daemon, car, tmp_p
         second.end()
 
 
+@pytest.mark.study
 def test_two_testers_at_once(unit, tmp_path):
     """They have one pair of identifiers: each hears the other's answers too, and asks again."""
     wanted = {
@@ -141,6 +143,7 @@ def test_two_testers_at_once(unit, tmp_path):
     unharmed(unit, tmp_path / "record")
 
 
+@pytest.mark.study
 def test_a_tester_that_dies_in_the_middle_of_a_message(unit, tmp_path):
     """In a request after its first frame, in a response before its flow control; then another one asks."""
     with foreign_tester() as client:
@@ -151,6 +154,7 @@ def test_a_tester_that_dies_in_the_middle_of_a_message(unit, tmp_path):
     unharmed(unit, tmp_path / "record")
 
 
+@pytest.mark.study
 def test_fuzzed_frames_and_requests(unit, tmp_path):
     draw = random.Random(20)
     with foreign_tester() as client:
@@ -253,6 +257,7 @@ def test_the_small_tester(unit, tmp_path):
     unharmed(unit, tmp_path / "record")
 
 
+@pytest.mark.study
 def test_a_reset_restarts_a_shadow_by_its_service_manager(daemon, car, tmp_path):
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(str(tmp_path / "notify"))
@@ -267,6 +272,7 @@ def test_a_reset_restarts_a_shadow_by_its_service_manager(daemon, car, tmp_path)
         assert one.wait_for("stopped")["by"] == "SIGTERM"
 
 
+@pytest.mark.study
 def test_garbage_on_the_multicast_port_does_not_end_it(unit, tmp_path):
     with foreign_tester() as client:
         asked(client, lambda one: one.tester_present())

@@ -12,7 +12,7 @@ from brakelab.testing.daemon import PATIENCE_S
 
 from .conftest import ROOT
 
-pytestmark = pytest.mark.multicast
+pytestmark = [pytest.mark.study, pytest.mark.multicast]
 
 GROUP = f"239.83.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"
 BUS = ("udp_multicast", GROUP)

@@ -90,6 +90,7 @@ def test_it_attaches_tells_the_end_and_attaches_again(daemon, car, watch):
 
 
 @pytest.mark.skipif(chromium() is None, reason="there is no chromium to open the page with")
+@pytest.mark.study
 def test_the_page_in_a_browser(daemon, car, watch, tmp_path):
     first = daemon(*BUS)
     first.wait_for("ready")

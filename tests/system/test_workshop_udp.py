@@ -99,6 +99,7 @@ def test_refused_on_the_road_done_at_rest_stored_and_replayed_to_the_bit(unit, c
     assert np.array_equal(learned["mu_b"], new_state(params)["learned"]["mu_b"])
 
 
+@pytest.mark.study
 def test_two_testers_at_once_do_whole_works_or_none(unit, car, tmp_path, monkeypatch):
     """Ours and a foreign one on one pair of identifiers: each may take the other's answer, and asks again."""
     car.set(decel_demand=0)
@@ -134,6 +135,7 @@ def test_two_testers_at_once_do_whole_works_or_none(unit, car, tmp_path, monkeyp
     assert same_bits(read_recording(tmp_path / "record").folder, tmp_path / "result.parquet") == []
 
 
+@pytest.mark.study
 def test_a_tester_that_dies_in_the_middle_leaves_all_or_nothing(unit, car, tmp_path):
     """In its first frame, and once it has asked: then it is done, and said in the log."""
     car.set(decel_demand=0)
@@ -153,6 +155,7 @@ def test_a_tester_that_dies_in_the_middle_leaves_all_or_nothing(unit, car, tmp_p
     assert same_bits(read_recording(tmp_path / "record").folder, tmp_path / "result.parquet") == []
 
 
+@pytest.mark.study
 def test_a_standby_does_what_is_done_to_the_first_one(unit, daemon, car, tmp_path):
     bus = ("--config", ROOT / "config" / "suv.toml", "--armed", "-i", "udp_multicast", "-c", GROUP)
     second = daemon(*bus, "--standby", "--state", tmp_path / "second")

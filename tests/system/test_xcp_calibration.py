@@ -148,6 +148,7 @@ def test_armed_and_moving_nothing_is_taken_over_standing_it_is(unit, connect, ca
     assert same_bits(recorded.folder, tmp_path / "result.parquet") == []
 
 
+@pytest.mark.study
 def test_a_master_that_dies_with_half_a_value_downloaded_leaves_nothing_behind(unit, connect, tmp_path):
     port = free_port()
     one = unit(f"udp:{port}", stands=True)
@@ -167,6 +168,7 @@ def test_a_master_that_dies_with_half_a_value_downloaded_leaves_nothing_behind(u
     assert read_recording(tmp_path / "record").calibrations == []
 
 
+@pytest.mark.study
 def test_what_is_stored_is_a_config_file_and_a_slave_that_is_killed_goes_on_with_it(unit, connect, tmp_path):
     port = free_port()
     one = unit(f"udp:{port}", "--armed", stands=True)
@@ -194,6 +196,7 @@ def test_what_is_stored_is_a_config_file_and_a_slave_that_is_killed_goes_on_with
     assert same_bits(recorded.folder, tmp_path / "result.parquet") == []
 
 
+@pytest.mark.study
 def test_on_the_bus_of_the_run_all_comes_in_pieces(unit, tmp_path):
     one = unit("can:0x7A0:0x7A8")
     master = Master(CanWire(open_bus("udp_multicast", GROUP), 0x7A0, 0x7A8)).connect()
@@ -206,6 +209,7 @@ def test_on_the_bus_of_the_run_all_comes_in_pieces(unit, tmp_path):
     unharmed(one, tmp_path / "record")
 
 
+@pytest.mark.study
 def test_a_recorder_that_dies_notes_it_all_the_same(unit, connect, tmp_path):
     port = free_port()
     one = unit(f"udp:{port}")

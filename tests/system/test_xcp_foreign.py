@@ -17,7 +17,7 @@ from .test_xcp_udp import GROUP, SIGNALS
 
 pyxcp = pytest.importorskip("pyxcp", reason="pyxcp is not installed: pip install pyxcp")
 
-pytestmark = pytest.mark.multicast
+pytestmark = [pytest.mark.study, pytest.mark.multicast]
 
 SECONDS = 2.0
 

@@ -52,6 +52,7 @@ def slave_of(unit):
 
 
 @pytest.mark.parametrize("kind", ["udp", "tcp"])
+@pytest.mark.study
 def test_two_hundred_signals_at_100_hz_none_is_lost_and_all_are_those_of_the_recording(
     unit, connect, port, tmp_path, kind
 ):
@@ -109,6 +110,7 @@ def test_the_slave_hands_out_its_own_file_of_addresses(unit, connect, port):
     )
 
 
+@pytest.mark.study
 def test_on_the_bus_of_the_run(unit, daemon, tmp_path):
     one = unit("can:0x7A0:0x7A8", "--diagnostics", "0x7E0:0x7E8")
     asks = Master(CanWire(open_bus("udp_multicast", GROUP), 0x7A0, 0x7A8)).connect()
@@ -134,6 +136,7 @@ def test_on_the_bus_of_the_run(unit, daemon, tmp_path):
     unharmed(one, tmp_path / "record")
 
 
+@pytest.mark.study
 def test_a_master_that_dies_while_it_measures(unit, connect, port, tmp_path):
     """On UDP nothing says so: the next one is heard once the dead one has been silent."""
     one = unit(f"udp:{port}")
@@ -147,6 +150,7 @@ def test_a_master_that_dies_while_it_measures(unit, connect, port, tmp_path):
     unharmed(one, tmp_path / "record")
 
 
+@pytest.mark.study
 def test_a_second_master_on_tcp_is_refused_until_the_first_has_gone(unit, connect, port, tmp_path):
     one = unit(f"tcp:{port}")
     first = connect("tcp", port)
@@ -160,6 +164,7 @@ def test_a_second_master_on_tcp_is_refused_until_the_first_has_gone(unit, connec
 
 
 @pytest.mark.parametrize("kind", ["udp", "tcp"])
+@pytest.mark.study
 def test_floods_and_garbage(unit, connect, port, tmp_path, kind):
     one = unit(f"{kind}:{port}")
     asks = connect(kind, port)
@@ -199,6 +204,7 @@ def test_loop_and_recorder_do_not_care_for_the_slave(unit, connect, port, tmp_pa
     unharmed(one, tmp_path / "record")
 
 
+@pytest.mark.study
 def test_the_end_of_a_run_is_reported(unit, connect, port):
     one = unit(f"udp:{port}")
     asks = connect("udp", port)

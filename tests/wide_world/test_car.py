@@ -13,7 +13,7 @@ from .route import G, Route
 from .state import ROW, STATE
 from .tyre import BRUSH, Tyre, greatest
 
-pytestmark = pytest.mark.compiled
+pytestmark = [pytest.mark.study, pytest.mark.compiled]
 
 
 BODY = Body(

@@ -25,6 +25,8 @@ from .draw import draw
 from .logger import record, write
 from .route import G, Values
 
+pytestmark = pytest.mark.study
+
 Columns = dict[str, Values]
 Change = Callable[[Columns], None]
 
@@ -138,7 +140,6 @@ def test_friction_that_falls_with_pressure_is_no_wrong_unit(logged: dict[tuple[i
         assert contradictions(carbon, lengths) == [], car
 
 
-@pytest.mark.study
 @pytest.mark.parametrize(("what", "change", "begins", "least"), WRONG, ids=[row[0] for row in WRONG])
 def test_a_contradiction_is_reported(
     logged: dict[tuple[int, int], Logged], what: str, change: Change, begins: str, least: int

@@ -12,7 +12,7 @@ from .brakings import find, read
 from .draw import CARS, SETS, Stranger, draw
 from .logger import record
 
-pytestmark = pytest.mark.compiled
+pytestmark = [pytest.mark.study, pytest.mark.compiled]
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from .car import NO_ABS
 from .draw import draw
 from .driver import Engine, change_gear
 
-pytestmark = pytest.mark.compiled
+pytestmark = [pytest.mark.study, pytest.mark.compiled]
 
 
 ENGINE = Engine(

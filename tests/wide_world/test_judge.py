@@ -13,6 +13,8 @@ from .logger import CORNERS
 from .route import G
 from .test_brakings import NOMINAL, pulse, signals
 
+pytestmark = pytest.mark.study
+
 
 def result(**columns: float) -> dict[str, np.ndarray]:
     """Result columns of the signals of `signals`: constants, but in row 300 and later all is doubled."""
@@ -127,7 +129,6 @@ def test_a_car_is_judged_from_the_command_line(tmp_path: Path, capsys: pytest.Ca
     assert '"predictor": "running average"' in out.read_text("utf-8")
 
 
-@pytest.mark.study
 def test_thirty_strangers(tmp_path: Path) -> None:
     """References in the order that recorded cars showed, and the product near the best of them."""
     judged = [one for number in range(30) for one in judge_car(1, number, tmp_path)]

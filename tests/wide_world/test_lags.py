@@ -12,6 +12,8 @@ from .logger import record
 from .state import ROW
 from .test_contradictions import grid
 
+pytestmark = pytest.mark.study
+
 COLUMN = {INPUT_SIGNALS[place].name: column for column, place in enumerate(SAMPLED)}
 CARS = ((1, 7), (1, 8), (1, 11), (1, 14), (1, 19), (1, 20), (2, 14), (2, 21))
 """Seed and number: a late speed of several kinds, and four wheels beside a late accelerometer."""
@@ -47,7 +49,6 @@ def test_the_lag_of_a_logger_is_found(logged: list[tuple[Stranger, np.ndarray]])
         assert abs(error) < 0.02
 
 
-@pytest.mark.study
 @pytest.mark.parametrize("added", ADDED)
 def test_an_added_lag_is_found(logged: list[tuple[Stranger, np.ndarray]], added: float) -> None:
     for one, samples in logged:

@@ -13,6 +13,8 @@ from .judge import LEAST_DECEL, published
 from .logger import CORNERS, record, write
 from .route import Values
 
+pytestmark = pytest.mark.study
+
 Columns = dict[str, Values]
 CARS = ((1, 7), (1, 9))
 """Seed and number: one speed for all wheels, and four wheel speeds at 20 Hz."""

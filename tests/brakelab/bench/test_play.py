@@ -50,6 +50,7 @@ def test_late_is_against_the_earliest_frame(numbers: list[int], came: list[int],
 
 
 @pytest.mark.multicast
+@pytest.mark.study
 def test_play_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "SPEEDS", (20.0,))
     monkeypatch.setattr(bench, "choose_bus", lambda: Bus("udp_multicast", "239.76.1.2", "a bus"))

@@ -66,6 +66,7 @@ def test_of_a_fleet_without_one_good_drive_each_reason_is_said(
     assert "Drives that failed" in (tmp_path / "out" / "report.html").read_text("utf-8")
 
 
+@pytest.mark.study
 def test_a_fleet_is_its_drives_in_order(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -16,6 +16,8 @@ from ecu.settings.resources import resource
 from .master import DISCARD, ERROR, OK, STEP, Fmu, Instance, assert_refused
 from .test_ecu_unit import DRIVING
 
+pytestmark = pytest.mark.study
+
 ENTER = ("EnterInitializationMode", c_bool(False), c_double(0.0), c_double(0.0), c_bool(False), c_double(0.0))
 
 _BYTES = ctypes.create_string_buffer(100)

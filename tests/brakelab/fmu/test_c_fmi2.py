@@ -11,6 +11,8 @@ from .master import DISCARD, ERROR, OK, Fmu, Instance, assert_refused
 from .test_c_states import braking
 from .test_ecu_unit import DRIVING
 
+pytestmark = pytest.mark.study
+
 
 @pytest.mark.parametrize("name", ["suv", "stop"])
 def test_both_versions_give_the_same_bits(request: pytest.FixtureRequest, name: str) -> None:

@@ -12,6 +12,7 @@ from ecu.cli import main
 from ecu.settings.resources import resource
 
 
+@pytest.mark.study
 def test_the_same_ecu_gives_the_same_bytes(tmp_path: Path) -> None:
     for name in ("a", "b"):
         assert main(["fmu", "ecu", "--config", "suv", "--out", str(tmp_path / f"{name}.fmu")]) == 0
@@ -46,6 +47,7 @@ def test_a_car_of_a_configuration(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["c\x01", "b\udcff", 'Nässe <&> "1"'])
+@pytest.mark.study
 def test_a_scenario_may_be_called_anything(tmp_path: Path, name: str) -> None:
     scenario, out = tmp_path / f"{name}.toml", tmp_path / "vehicle.fmu"
     scenario.write_bytes(resource("config/scenarios/stop-1.toml").read_bytes())

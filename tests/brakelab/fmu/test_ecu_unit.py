@@ -29,6 +29,8 @@ from ecu.settings.resources import resource
 from .conftest import Make
 from .master import OK, Fmu, Instance
 
+pytestmark = pytest.mark.study
+
 DRIVING = {
     **{f"wheel_speed_{corner}": 60.0 for corner in ("fl", "fr", "rl", "rr")},
     **{f"calliper_pressure_{corner}": 0.3 for corner in ("fl", "fr", "rl", "rr")},

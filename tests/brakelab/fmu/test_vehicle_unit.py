@@ -17,6 +17,8 @@ from ecu.settings.resources import resource
 from .conftest import Make
 from .master import OK, WARNING, Fmu
 
+pytestmark = pytest.mark.study
+
 
 def simulated(scenario: str, config: str) -> Drive:
     path = resource(f"config/scenarios/{scenario}.toml")

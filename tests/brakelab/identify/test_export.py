@@ -18,6 +18,8 @@ from ecu.errors import UserError
 from ecu.settings.resources import resource
 from tests.brakelab.test_c_source import compiled
 
+pytestmark = pytest.mark.study
+
 SHIPPED = resource("config/plant/linings.toml")
 RANDOM = np.random.default_rng(1)
 BRAKE = """

@@ -58,6 +58,7 @@ def test_results_are_those_of_candump(kona: dict[str, Path], tmp_path: Path, end
 
 
 @pytest.mark.parametrize("end", [".asc", ".blf", ".trc"])
+@pytest.mark.study
 def test_logs_of_can_logconvert(tmp_path: Path, end: str) -> None:
     out = tmp_path / f"mustang{end}"
     head = tmp_path / "head.log"
@@ -69,6 +70,7 @@ def test_logs_of_can_logconvert(tmp_path: Path, end: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["can0", "can1", "1", "2"])
+@pytest.mark.study
 def test_a_bus_of_an_mdf_file_by_python_can_is_that_of_the_other_formats(
     kona: dict[str, Path], tmp_path: Path, name: str
 ) -> None:

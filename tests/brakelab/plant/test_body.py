@@ -32,6 +32,7 @@ def test_transfer_balances_the_moment_of_inertia_forces(
     assert (load[1::2].sum() - load[::2].sum()) * TRACK / 2 == pytest.approx(MASS * accel_y * HEIGHT)
 
 
+@pytest.mark.study
 def test_loads_follow_the_braking_force_late_and_settle(car_at: Callable[[float], Any]) -> None:
     car = car_at(30.0)
     car.freeze_friction()

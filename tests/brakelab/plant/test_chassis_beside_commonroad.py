@@ -18,6 +18,8 @@ from scipy.integrate import solve_ivp
 from brakelab.plant.tyre import rolling_radius
 from brakelab.plant.vehicle import new_state
 
+pytestmark = pytest.mark.study
+
 multi_body = pytest.importorskip("vehiclemodels.vehicle_dynamics_mb")
 G: Final = 9.81
 SECONDS: Final = 3.0

@@ -12,6 +12,8 @@ from brakelab.plant.description import Engine, Plant, PlantFileError, load_plant
 from brakelab.plant.draw import Widths, draw, draw_sensors, load_widths
 from brakelab.plant.sensor_errors import STANDARD
 
+pytestmark = pytest.mark.study
+
 DRAW = Path(__file__).parents[3] / "config" / "plant" / "draw.toml"
 SEEDS, MANY = range(80), range(150)
 WIDE, NOMINAL = load_widths(DRAW, "wide"), load_widths(DRAW, "nominal")

@@ -51,6 +51,7 @@ def test_road_is_linear_between_rows_and_constant_outside(t: float, value: float
     assert value_at(np.array([[0.0, 1.2], [2.0, 1.2], [3.0, 0.7]]), t, 1) == pytest.approx(value)
 
 
+@pytest.mark.study
 def test_demand_reaches_4_within_the_time_a_pedal_takes(car_at: Callable[[float], Any]) -> None:
     trip = Trip(car_at(30.0), script({"kind": BRAKE, "decel": 4.0}))
     demands = []

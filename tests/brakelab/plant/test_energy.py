@@ -16,6 +16,8 @@ from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.scenario import load_scenario
 from ecu.settings.config import load_config
 
+pytestmark = pytest.mark.study
+
 CONFIG = Path(__file__).parents[3] / "config"
 SCENARIOS = sorted(path.stem for path in (CONFIG / "scenarios").glob("*.toml"))
 LONGEST_SCENARIO = 60.0  # s of a scenario

@@ -11,6 +11,8 @@ from brakelab.plant.fleet import advance_fleet
 from brakelab.plant.records import COMMANDS, STATE, RecordArray
 from brakelab.plant.vehicle import STEP, advance, new_state
 
+pytestmark = pytest.mark.study
+
 CONFIG = Path(__file__).parents[3] / "config" / "plant"
 CARS = 5
 

@@ -130,6 +130,7 @@ def test_high_demands_settle_lower_unless_the_unit_knows_its_offset(
 
 
 @pytest.mark.parametrize("number", range(1, STEPS + 1))
+@pytest.mark.study
 def test_every_step_of_the_staircase_has_the_dead_and_rise_times_of_its_model(number: int) -> None:
     low, high = 10.0 * (number - 1), 10.0 * number
     up, down = measure_step(low, high), measure_step(high, low)

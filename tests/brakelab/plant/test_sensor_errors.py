@@ -41,6 +41,7 @@ def times(count: int) -> Samples:
 
 
 @pytest.mark.parametrize(("noise", "resolution"), [(0.1, 0.0), (0.0, 0.3), (0.1, 0.3), (0.05, 0.01)])
+@pytest.mark.study
 def test_noise_and_resolution_add_their_variances(noise: float, resolution: float) -> None:
     true = 7.0 * math.sqrt(2.0) * times(400)  # crosses the steps at every phase
     error = signals(true, many=100, noise=noise, resolution=resolution) - true[:, None]

@@ -97,6 +97,7 @@ def test_page_is_small_and_names_no_address(source: str) -> None:
     assert "default-src 'none'" in source
 
 
+@pytest.mark.study
 def test_a_quarter_of_an_hour_with_45_brakings_stays_small(drive_files: Files) -> None:
     def longer(table: pa.Table) -> pa.Table:
         many = pa.concat_tables([table] * 15)
@@ -239,6 +240,7 @@ def test_friction_that_nobody_knows_is_one_dash(drive_files: Files) -> None:
     assert "Friction rear, ±2σ 0." in shown
 
 
+@pytest.mark.study
 def test_wheel_torque_in_the_log_stands_for_the_truth(drive_files: Files) -> None:
     def measured(table: pa.Table) -> pa.Table:
         for corner in CORNERS:

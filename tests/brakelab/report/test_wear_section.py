@@ -20,6 +20,8 @@ from ecu.errors import UserError
 
 from .conftest import write
 
+pytestmark = pytest.mark.study
+
 DT, TOWN, MOTORWAY = 0.1, 36.0 / 3.6, 108.0 / 3.6  # s, m/s
 HALF = 1000.0  # s in town, as many on the motorway
 STOPS = tuple(50.0 + 100.0 * k for k in range(20))

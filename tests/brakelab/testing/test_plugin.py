@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[3]
 
 
 @pytest.mark.multicast
+@pytest.mark.study
 def test_the_example_passes_in_both_times(tmp_path: Path) -> None:
     (code,) = re.findall(r"```python\n(.+?)```", (ROOT / "docs/testing.md").read_text("utf-8"), re.S)
     (tmp_path / "test_town.py").write_text(code, "utf-8")

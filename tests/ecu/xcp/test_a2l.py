@@ -164,6 +164,7 @@ def test_the_command_writes_or_prints(tmp_path, capsys):
         a2l(None, ["x"], None)
 
 
+@pytest.mark.study
 def test_a_foreign_reader_takes_it(tmp_path):
     """pya2l reads it by a grammar of its own."""
     pya2l = pytest.importorskip("pya2l", reason="pya2ldb is not installed")

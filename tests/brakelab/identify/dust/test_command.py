@@ -16,6 +16,8 @@ from brakelab.simulation.campaigns.dust_trips import COLUMNS, campaign, write_ca
 from ecu.errors import RunFault, UserError
 from ecu.settings.config import load_config, new_params, store_key
 
+pytestmark = pytest.mark.study
+
 CONFIG = Path(__file__).parents[4] / "config" / "lcv.toml"
 
 

@@ -15,6 +15,8 @@ from brakelab.simulation.trip.wltp_brake import TOTALS, TRIPS, wltp_brake
 from ecu.errors import UserError
 from ecu.settings.config import load_config
 
+pytestmark = pytest.mark.study
+
 CONFIG = Path(__file__).parents[4] / "config" / "suv.toml"
 SLOWED, RADIUS, FLOW = 600.0, 0.355, 0.25  # kg, m, m^3/s
 WHOLE = {

@@ -18,6 +18,8 @@ from brakelab.identify.dust.fit import (
 )
 from brakelab.identify.dust.model import Model
 
+pytestmark = pytest.mark.study
+
 SCATTER = 0.25  # of EF
 NONE = Background(0.0, 0.0, np.empty(0), np.empty(0), np.empty(0))
 

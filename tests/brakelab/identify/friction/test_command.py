@@ -96,6 +96,7 @@ def test_a_law_of_one_s_own_is_identified_with_the_others(
     assert found.numbers["heat"] * found.numbers["mu"] == pytest.approx(slope, rel=1e-2)
 
 
+@pytest.mark.study
 def test_found_terms_are_written_and_judged_as_a_law(
     tmp_path: Path, recording: Recording, lining: Lining, columns: Columns, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,6 +18,8 @@ from brakelab.plant.friction.law import RigBrake
 from brakelab.plant.linings import Linings
 from ecu.settings.resources import resource
 
+pytestmark = pytest.mark.study
+
 PAGE = resource("docs/results/friction-lab.md")
 
 

@@ -14,6 +14,8 @@ from brakelab.identify.friction.recording import Recording
 from brakelab.identify.friction.stops import find_stops
 from brakelab.plant.linings import Lining
 
+pytestmark = pytest.mark.study
+
 GRID = np.meshgrid(np.linspace(-1.0, 1.0, 21), np.linspace(-1.0, 1.0, 21))
 
 

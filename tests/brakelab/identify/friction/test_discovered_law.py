@@ -12,6 +12,8 @@ from brakelab.identify.friction.discovery import NAMES, Found, _shot, library
 from brakelab.identify.friction.fit import replayed
 from brakelab.identify.friction.stops import Stops
 
+pytestmark = pytest.mark.study
+
 SLOW = {
     # term: its part of friction over a stop, small so that steps of 5 ms are exact
     "κ: 1": 0.25,

@@ -23,6 +23,8 @@ from brakelab.identify.friction.stops import Stops, find_stops
 from brakelab.plant.friction.law import KELVIN
 from brakelab.plant.linings import Lining, rig_with
 
+pytestmark = pytest.mark.study
+
 R1 = {"κ: 1": 0.2687, "κ: T": 0.3075e-3, "α': p v μ": -24.1e-9, "α': |ω'|": 2.302e-2, "α': p T": -1.226e-10}
 DRAWS = 3
 
@@ -42,7 +44,6 @@ def expected(of: Library, lining: Lining) -> np.ndarray:
     return si / of.scale[list(ILVO)]
 
 
-@pytest.mark.study
 def test_ilvo_s_terms_are_found_in_ilvo_s_stops(r1_stops: Callable[[int], Stops], lining: Lining) -> None:
     """1 % noise; 20 draws of each brake: `brake-ecu bench lab`."""
     for draw in range(DRAWS):
@@ -53,7 +54,6 @@ def test_ilvo_s_terms_are_found_in_ilvo_s_stops(r1_stops: Callable[[int], Stops]
         assert found.error == pytest.approx(1.0 / np.sqrt(10.0), abs=0.02)
 
 
-@pytest.mark.study
 def test_shooting_explains_all_but_the_noise(r1_stops: Callable[[int], Stops]) -> None:
     """In these terms or in what is the same: p mu is p kappa alpha, p alpha and p T alpha."""
     found = greedy(library(r1_stops(0)))
@@ -62,7 +62,6 @@ def test_shooting_explains_all_but_the_noise(r1_stops: Callable[[int], Stops]) -
     assert len(found.terms) <= len(ILVO) + 2
 
 
-@pytest.mark.study
 @pytest.mark.parametrize("search", [sparse, greedy])
 def test_where_friction_is_constant_nothing_is_found(
     r1_stops: Callable[[int], Stops], search: Callable[[Library], object]
@@ -74,7 +73,6 @@ def test_where_friction_is_constant_nothing_is_found(
     assert found.coefficients == pytest.approx([0.4], abs=1e-3)  # type: ignore[attr-defined]
 
 
-@pytest.mark.study
 def test_on_a_pad_that_is_no_law_the_terms_explain_more_than_a_constant(stops: Stops) -> None:
     found = sparse(library(stops))
     print(found.names(), found.error)

@@ -26,6 +26,8 @@ from brakelab.identify.friction.stops import Stops, block_inputs, some
 from brakelab.identify.friction.trips import Trip, drive, manoeuvres
 from brakelab.plant.linings import Lining
 
+pytestmark = pytest.mark.study
+
 
 @pytest.fixture(scope="module")
 def two_trips(lining: Lining, columns: Columns) -> tuple[Trip, Trip]:
@@ -67,7 +69,6 @@ def test_a_second_order_surface_finds_a_second_order_surface(stops: Stops, colum
     assert law[within] == pytest.approx(made.mu[within], abs=1e-3)
 
 
-@pytest.mark.study
 def test_the_ranking_of_table_2_1(two_trips: tuple[Trip, Trip], lining: Lining) -> None:
     """The network first over all manoeuvres, of which a trip of 40 brakings has few each (in each of them:
     `bench lab`); a wrong temperature costs it, and the surface nothing."""

@@ -16,6 +16,8 @@ from brakelab.plant.friction.ostermeyer import Ostermeyer
 from brakelab.plant.friction.table import Table
 from brakelab.plant.linings import Lining, rig_with
 
+pytestmark = pytest.mark.study
+
 TRUTH = {"kappa_0": 0.2687, "kappa_1": 0.3075e-3, "a": 24.1e-9, "b": 2.302e-2, "c": 1.226e-10}
 DRAWS = 8
 
@@ -32,7 +34,6 @@ def r1_columns(lining: Lining) -> Columns:
     return Columns.own(lining, float(rig["mass"] * rig["tyre_radius"] ** 2))
 
 
-@pytest.mark.study
 def test_ilvo_is_found_in_its_own_data_within_its_intervals(
     lining: Lining, r1_columns: Columns, ilvo_recording: Run
 ) -> None:

@@ -18,6 +18,8 @@ from brakelab.identify.friction.stops import Stops, find_stops
 from brakelab.plant.linings import Lining
 from ecu.errors import UserError
 
+pytestmark = pytest.mark.study
+
 Write = Callable[..., Path]
 
 

@@ -10,6 +10,8 @@ from brakelab.identify.friction.recording import Recording
 from brakelab.identify.friction.stops import Stops, find_stops
 from brakelab.identify.friction.uncertainty import standard_uncertainty
 
+pytestmark = pytest.mark.study
+
 DRAWS = 120
 SOURCES = {
     "torque": Uncertainty(torque=8.0),

@@ -18,6 +18,8 @@ from ecu.settings.config import load_config, new_params, store_key
 
 from .series import TRUE, XI, discs, series
 
+pytestmark = pytest.mark.study
+
 ROOT = Path(__file__).parents[4]
 CONFIG = ROOT / "config" / "suv.toml"
 

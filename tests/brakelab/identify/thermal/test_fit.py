@@ -17,6 +17,8 @@ from brakelab.identify.thermal.model import Cooling
 
 from .series import TRUE, XI, discs, series
 
+pytestmark = pytest.mark.study
+
 START_XI = 1.7e-4
 START = Cooling(1.3e-3, 1.4e-4, 1.3e-3, 2.1e-4)
 
@@ -80,7 +82,6 @@ def test_a_sensor_that_is_off_moves_xi_by_no_more_than_its_sigma() -> None:
     assert np.abs(in_sigmas(fit)[[HEATING, STILL, BY_SPEED]]).max() < 2.5
 
 
-@pytest.mark.study
 def test_what_the_lump_leaves_over_is_not_taken_for_noise() -> None:
     """Errors that last 200 s and are common to both discs: 12 drives, two sigma of each number."""
     off = np.array(

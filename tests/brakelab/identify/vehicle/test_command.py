@@ -19,6 +19,8 @@ from ecu.settings.config import load_config, new_params
 
 from .example import SUV
 
+pytestmark = pytest.mark.study
+
 SEED = 3
 
 

@@ -10,6 +10,8 @@ from ecu.settings.config import load_config
 
 from .example import SUV
 
+pytestmark = pytest.mark.study
+
 PAGE = (Path(__file__).parents[4] / "docs/identify-vehicle.md").read_text("utf-8")
 BLOCKS = re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)
 

@@ -21,6 +21,8 @@ from brakelab.simulation.campaigns.wear_blocks import (
 from ecu.errors import UserError
 from ecu.settings.config import load_config
 
+pytestmark = pytest.mark.study
+
 CONFIG = Path(__file__).parents[4] / "config" / "suv.toml"
 
 

@@ -12,6 +12,8 @@ from brakelab.bench import fleet_drives as generate
 from ecu.cli import main
 from ecu.settings.resources import resource
 
+pytestmark = pytest.mark.study
+
 PAGE = (resource("docs") / "tutorial-pad-life.md").read_text("utf-8")
 
 
@@ -64,7 +66,6 @@ def test_the_wear_half_with_short_drives(
     assert "Who needs pads when" in Path("out/fleet/report.html").read_text("utf-8")
 
 
-@pytest.mark.study
 def test_all_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _follow(PAGE, tmp_path, monkeypatch)
     pads = pq.read_table("out/fleet/pads.parquet")

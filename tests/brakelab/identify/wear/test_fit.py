@@ -8,6 +8,8 @@ from brakelab.identify.wear.fit import QUASI_STATIC, explains, fit_law, rank_of,
 from brakelab.identify.wear.fusion import BALANCE, POINT, POINTS, disagreeing, fuse, unequal
 from ecu.errors import UserError
 
+pytestmark = pytest.mark.study
+
 LAW = np.array([0.1016, 0.0, 0.0, 0.4887, 0.0, 0.0, 0.66e-2])  # Table 7.1 without its smallest term
 SEEDS = 40
 
@@ -62,7 +64,6 @@ MISTYPED = {
 }
 
 
-@pytest.mark.study
 @pytest.mark.parametrize(("true", "grams", "found", "wrongly", "error"), MISTYPED.values(), ids=MISTYPED)
 def test_two_grams_mistyped_without_a_thickness_are_found_over_seeds(true, grams, found, wrongly, error):
     """Eight blocks, 3 % scatter. By 80 % and the others' median 12 % were found."""
@@ -136,7 +137,6 @@ def test_pads_that_share_their_wear_unlike_in_the_other_blocks(grams: float, fou
     assert [place for place, _ in unequal(inboard, outboard)] == found
 
 
-@pytest.mark.study
 @pytest.mark.parametrize(("blocks", "error", "holds"), [(4, 0.16, 0.5), (8, 0.02, 0.85), (12, 0.015, 0.85)])
 def test_the_true_mass_is_predicted_and_confidence_holds_over_seeds(blocks, error, holds):
     """New blocks by the identified law, and the true terms in their 95 %, whichever sets were chosen.

@@ -19,6 +19,8 @@ from brakelab.results.files import BRAKE_SCHEMA, brakes_path
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
+pytestmark = pytest.mark.study
+
 CONFIG = Path(__file__).parents[4] / "config" / "suv.toml"
 SLOWED = 600.0  # kg by one front brake
 RADIUS = 0.35

@@ -8,6 +8,8 @@ import pytest
 from brakelab.simulation.campaigns import dust_trips
 from brakelab.simulation.campaigns.dust_trips import APPLICATION, COLUMNS, campaign, write_campaign
 
+pytestmark = pytest.mark.study
+
 
 @pytest.fixture(scope="module")
 def trips():

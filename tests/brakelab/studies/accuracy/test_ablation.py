@@ -24,6 +24,8 @@ from ecu.algorithm.step import new_state
 from ecu.contract.records import LEARNED, RecordArray, new_record
 from ecu.settings.config import new_params
 
+pytestmark = pytest.mark.study
+
 STOP = with_draw(shipped("stop-1"), "nominal")
 
 

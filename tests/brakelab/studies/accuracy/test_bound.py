@@ -30,6 +30,8 @@ from brakelab.studies.accuracy.observers import counted
 from brakelab.studies.accuracy.observers_cases import ACCURACY
 from ecu.contract.signals import CORNERS
 
+pytestmark = pytest.mark.study
+
 
 def _one_wheel(walk: float, noise: float, steps: int) -> System:
     """Friction of one wheel whose torque is seen."""

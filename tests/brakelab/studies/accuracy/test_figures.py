@@ -13,6 +13,8 @@ from brakelab.studies.accuracy.figures import BEFORE, Shown, _driven, _error_row
 from brakelab.studies.physics.heat import heat_panels
 from ecu.settings.resources import resource
 
+pytestmark = pytest.mark.study
+
 
 def test_a_drive_is_drawn_from_before_its_braking_and_counted(tmp_path: Path) -> None:
     shown = Shown("5.4", "blending-60", ("brake_torque", "mu_b"))

@@ -8,6 +8,8 @@ from brakelab.studies.accuracy.loggers import LOGGERS, Logger, logger_columns, r
 from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import CORNERS
 
+pytestmark = pytest.mark.study
+
 
 @pytest.fixture(scope="module")
 def car():

@@ -45,6 +45,8 @@ from ecu.contract.params import OBSERVERS
 from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import CORNERS
 
+pytestmark = pytest.mark.study
+
 STOP = "stop #1"
 
 

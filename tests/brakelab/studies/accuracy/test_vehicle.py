@@ -17,6 +17,8 @@ from brakelab.studies.accuracy.vehicle import (
 from ecu.settings.config import load_config
 from ecu.settings.resources import resource
 
+pytestmark = pytest.mark.study
+
 
 @pytest.mark.parametrize("seed", range(4))
 def test_start_is_20_percent_off_everywhere(seed):
@@ -59,7 +61,6 @@ def test_the_table_counts_and_names_misses():
     assert strange.rows[0] == ("1", "12", "10.0", "20.0", "2.0", "3.0")
 
 
-@pytest.mark.study
 def test_six_cars_are_identified_within_their_sigma_and_predict_a_strangers_drive():
     """The page has ten."""
     cars = [identified_of(seed) for seed in range(6)]

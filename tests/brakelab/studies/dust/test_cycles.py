@@ -13,6 +13,8 @@ from ecu.contract.dust import FEATURES, LAW_TERMS
 from ecu.settings.config import new_params
 from ecu.settings.dust import Dust
 
+pytestmark = pytest.mark.study
+
 
 def driven(particles: float, work: float = 4e6, mass: float = 2e9) -> CycleDrive:
     """Return 100 km with 8 g worn off, of which half stays in the air."""

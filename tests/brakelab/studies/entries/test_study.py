@@ -21,6 +21,8 @@ from brakelab.studies.entries.table import entry_tables, standings
 from ecu.contract.signals import INPUT
 from ecu.settings.config import Config
 
+pytestmark = pytest.mark.study
+
 ROOT = Path(__file__).parents[4]
 TRUE = np.array([0.40, 0.40, 0.50, 0.50])
 BRAKINGS, EACH, ON = 4, 600, slice(200, 500)

@@ -54,6 +54,7 @@ def test_every_column_of_table_3_4_is_complete() -> None:
     assert {len(column[brake]) for column in TABLE_3_4.values() for brake in BRAKES} == {6}
 
 
+@pytest.mark.study
 def test_the_bench_writes_its_page(monkeypatch: pytest.MonkeyPatch) -> None:
     written = []
     monkeypatch.setattr(output, "write_page", lambda name, *rest: written.append((name, len(rest[2]))))

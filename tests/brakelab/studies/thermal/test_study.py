@@ -5,6 +5,8 @@ import pytest
 
 from brakelab.studies.thermal.study import IDENTIFIED, JUDGED, drive_car
 
+pytestmark = pytest.mark.study
+
 
 def test_no_car_is_judged_by_the_trip_that_it_was_identified_on() -> None:
     for one in IDENTIFIED:
@@ -14,7 +16,6 @@ def test_no_car_is_judged_by_the_trip_that_it_was_identified_on() -> None:
     assert JUDGED[0].from_share == 0.0  # town too
 
 
-@pytest.mark.study
 def test_one_car_from_thermocouples_to_another_trip() -> None:
     car = drive_car(5)
     for trip in car.trips:

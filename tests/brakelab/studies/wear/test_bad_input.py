@@ -8,6 +8,8 @@ from brakelab.studies.lab.bad_input import Answer
 from brakelab.studies.wear.bad_input import BLOCKS, TRIPS, answers
 from ecu.settings.resources import resource
 
+pytestmark = pytest.mark.study
+
 
 @pytest.fixture(scope="module")
 def found() -> list[Answer]:

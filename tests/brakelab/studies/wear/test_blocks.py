@@ -8,6 +8,8 @@ from brakelab.simulation.campaigns.wear_blocks import drawn_car
 from brakelab.studies.wear.blocks import pair_of, repeated, sensitivity_table
 from brakelab.studies.wear.blocks_rig import CHECK_OFF, corner_of, energy_error, run_stops
 
+pytestmark = pytest.mark.study
+
 CORNER = corner_of(drawn_car(1), 0)
 
 
