@@ -112,6 +112,7 @@ def test_a_result_is_opened_as_it_was_handed_out(result: Result) -> None:
     assert len(opened.brakings) == 4
 
 
+@pytest.mark.study
 def test_a_notebook_shows_the_brake_applications_of_the_page(result: Result, tmp_path: Path) -> None:
     shown, page = result._repr_html_(), result.report(tmp_path / "stop.html").read_text("utf-8")
     cells = [re.findall(r"<td[^>]*>([^<]*)</td>", text.partition("<tbody>")[2]) for text in (shown, page)]

@@ -23,7 +23,10 @@ def test_what_was_compiled_once_is_loaded_by_the_next_process() -> None:
 
 @pytest.mark.compiled
 @pytest.mark.usefixtures("warmed")
-@pytest.mark.parametrize("scenario", ["fade", "blending-40", "low-grip"])
+@pytest.mark.parametrize(
+    "scenario",
+    ["fade", *(pytest.param(name, marks=pytest.mark.study) for name in ("blending-40", "low-grip"))],
+)
 def test_a_first_drive_compiles_nothing(scenario: str, tmp_path: Path) -> None:
     """Other linings, motors and roads than the one that warming drives."""
     brake_ecu = [sys.executable, "-m", "ecu.cli", "--verbose"]

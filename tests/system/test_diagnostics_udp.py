@@ -203,35 +203,6 @@ def test_it_does_not_listen_unless_asked(daemon, car):
     assert one.end() == 0
 
 
-@pytest.mark.parametrize(
-    ("options", "says"),
-    [
-        (("--diagnostics", "0x7E0"), "--diagnostics: 0x7E0: give the identifiers of request and response"),
-        (
-            ("--diagnostics", "0x50:0x7E8"),
-            "--diagnostics: 0x50: another message has it; choose one that is free",
-        ),
-        (
-            ("--diagnostics", "0x7E0:0x7E8", "--silent"),
-            "--diagnostics: 0x7E0:0x7E8: answers on the bus, where",
-        ),
-        (("--diagnostics-key", "KEY"), "is for a tester; give --diagnostics too"),
-        (
-            ("--diagnostics", "0x7E0:0x7E8", "--diagnostics-key", "KEY"),
-            "no key: write 16 bytes or more in hex",
-        ),
-    ],
-)
-def test_what_cannot_be_served_is_one_line(options, says, daemon, tmp_path):
-    (tmp_path / "KEY").write_text("secret")
-    (tmp_path / "KEY").chmod(0o600)
-    options = [tmp_path / "KEY" if option == "KEY" else option for option in options]
-    one = daemon("--config", "suv", "-i", "udp_multicast", "-c", GROUP, *options)
-    assert one.end(None) == 2
-    assert len(one.other) == 1
-    assert says in one.other[0]
-
-
 def diag(*words):
     """Run `brake-ecu diag`; return its exit code, output and errors."""
     with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as error:

@@ -226,28 +226,3 @@ def test_a_recorder_that_dies_notes_it_all_the_same(unit, connect, tmp_path):
     rates = [note.tables["control"]["max_pressure_rate"] for note in recorded.calibrations]
     assert rates == [2000.0, 2100.0, 2200.0]
     assert same_bits(recorded.folder, tmp_path / "result.parquet") == []
-
-
-@pytest.mark.parametrize(
-    ("options", "says"),
-    [
-        (("--xcp-key", "KEY"), "is for a master; give --xcp too"),
-        (("--xcp", "udp:1", "--xcp-save", "new.toml"), "is for calibration; give --xcp-key too"),
-        (("--xcp", "udp:1", "--xcp-key", "KEY", "--xcp-save", "CONFIG"), "is read by this run"),
-        (("--xcp", "udp:1", "--xcp-key", "KEY", "--xcp-save", "KEY"), "exists, and no calibration wrote it"),
-        (("--xcp", "udp:1", "--xcp-key", "KEY", "--xcp-save", "none/x.toml"), "its folder does not exist"),
-        (("--xcp", "udp:1", "--xcp-key", "CONFIG"), "others may read this secret; chmod 600 it"),
-    ],
-)
-def test_what_cannot_be_calibrated_is_one_line(options, says, daemon, tmp_path):
-    key, config = tmp_path / "key", tmp_path / "car.toml"
-    key.write_text(SECRET.hex())
-    key.chmod(0o600)
-    config.write_bytes(CONFIG.read_bytes())
-    places = {"KEY": key, "CONFIG": config, "none/x.toml": tmp_path / "none/x.toml"}
-    given = [places.get(word, word) for word in options]
-    one = daemon("--config", config, "-i", "udp_multicast", "-c", GROUP, *given)
-    assert one.end(None) == 2
-    assert len(one.other) == 1
-    assert says in one.other[0]
-    assert config.read_bytes() == CONFIG.read_bytes()

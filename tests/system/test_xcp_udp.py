@@ -221,25 +221,3 @@ def test_it_does_not_listen_unless_asked(daemon, car):
     car.drive(5)
     assert slave_of(one) is None
     assert one.end() == 0
-
-
-@pytest.mark.parametrize(
-    ("options", "says"),
-    [
-        (
-            ("--xcp", "5555"),
-            "--xcp: 5555: give udp:[ADDRESS:]PORT, tcp:[ADDRESS:]PORT or can:REQUEST:RESPONSE",
-        ),
-        (("--xcp", "can:0x50:0x7A8"), "--xcp: 0x50: another message has it; choose one that is free"),
-        (
-            ("--xcp", "can:0x7E0:0x7A8", "--diagnostics", "0x7E0:0x7E8"),
-            "--xcp: 0x7E0: another message has it; choose one that is free",
-        ),
-        (("--xcp", "can:0x7A0:0x7A8", "--silent"), "a --silent run sends nothing; give udp: or tcp:"),
-    ],
-)
-def test_what_cannot_be_served_is_one_line(options, says, daemon):
-    one = daemon("--config", "suv", "-i", "udp_multicast", "-c", GROUP, *options)
-    assert one.end(None) == 2
-    assert len(one.other) == 1
-    assert says in one.other[0]

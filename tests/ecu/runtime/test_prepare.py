@@ -9,6 +9,7 @@ from structlog.testing import capture_logs
 from ecu.errors import UserError
 from ecu.runtime import prepare
 from ecu.runtime.notify import Manager
+from ecu.runtime.xcp import Calibrating
 from ecu.settings.resources import resource
 
 CONFIG = resource("config/suv.toml")
@@ -88,3 +89,64 @@ def test_what_a_run_cannot_send_is_refused(tmp_path, message, output, more, line
     options = prepare.RunOptions(CONFIG, "virtual", "x", tmp_path / "car.toml", **more)
     with pytest.raises(UserError, match=line):
         prepare.prepare(options)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"diagnostics": "0x7E0"}, "--diagnostics: 0x7E0: give the identifiers of request and response"),
+        (
+            {"diagnostics": "0x50:0x7E8"},
+            "--diagnostics: 0x50: another message has it; choose one that is free",
+        ),
+        (
+            {"diagnostics": "0x7E0:0x7E8", "silent": True},
+            "--diagnostics: 0x7E0:0x7E8: answers on the bus, where a --silent run",
+        ),
+        ({"diagnostics_key": Path("short")}, "is for a tester; give --diagnostics too"),
+        (
+            {"diagnostics": "0x7E0:0x7E8", "diagnostics_key": Path("short")},
+            "no key: write 16 bytes or more in hex",
+        ),
+        ({"xcp": "5555"}, "--xcp: 5555: give udp:[ADDRESS:]PORT, tcp:[ADDRESS:]PORT or can:REQUEST:RESPONSE"),
+        ({"xcp": "can:0x50:0x7A8"}, "--xcp: 0x50: another message has it; choose one that is free"),
+        (
+            {"xcp": "can:0x7E0:0x7A8", "diagnostics": "0x7E0:0x7E8"},
+            "--xcp: 0x7E0: another message has it; choose one that is free",
+        ),
+        (
+            {"xcp": "can:0x7A0:0x7A8", "silent": True},
+            "answers on the bus, where a --silent run sends nothing; give udp: or tcp:",
+        ),
+        ({"calibrating": Calibrating(Path("key"))}, "is for a master; give --xcp too"),
+        (
+            {"xcp": "udp:1", "calibrating": Calibrating(None, Path("new.toml"))},
+            "is for calibration; give --xcp-key too",
+        ),
+        ({"xcp": "udp:1", "calibrating": Calibrating(Path("key"), Path("car.toml"))}, "is read by this run"),
+        (
+            {"xcp": "udp:1", "calibrating": Calibrating(Path("key"), Path("key"))},
+            "exists, and no calibration wrote it",
+        ),
+        (
+            {"xcp": "udp:1", "calibrating": Calibrating(Path("key"), Path("none/x.toml"))},
+            "its folder does not exist",
+        ),
+        (
+            {"xcp": "udp:1", "calibrating": Calibrating(Path("open"))},
+            "others may read this secret; chmod 600 it",
+        ),
+    ],
+)
+def test_what_cannot_be_served_is_refused_before_the_bus_is_opened(tmp_path, monkeypatch, options, says):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(prepare, "open_channel", None)
+    config = Path("car.toml")
+    config.write_bytes(CONFIG.read_bytes())
+    for key, text, mode in (("key", "0" * 64, 0o600), ("short", "0" * 6, 0o600), ("open", "0" * 64, 0o644)):
+        Path(key).write_text(text)
+        Path(key).chmod(mode)
+    with pytest.raises(UserError) as refused:
+        prepare.prepare(prepare.RunOptions(config, "virtual", "x", **options))
+    assert says in str(refused.value)
+    assert config.read_bytes() == CONFIG.read_bytes()
