@@ -128,6 +128,7 @@ def test_a_drive_without_braking_says_so_in_a_notebook(drive: Simulation) -> Non
     assert "no brake application of 0.5 s or longer" in quiet._repr_html_()
 
 
+@pytest.mark.study
 def test_a_page_is_written(drive: Simulation, result: Result, tmp_path: Path) -> None:
     page = result.report(tmp_path / "stop.html", truth=drive.truth_path)
     assert page.stat().st_size > 100_000

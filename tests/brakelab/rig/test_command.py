@@ -59,7 +59,7 @@ LONG, KEPT = "stopping distance at most 10 m", "never wheel slips"
 OWN = "every fault bit accounted for, replay to the bit, the configured car"
 
 
-@pytest.mark.parametrize(("limit", "code"), [("10.0", 0), ("1.0", 1)])
+@pytest.mark.parametrize(("limit", "code"), [pytest.param("10.0", 0, marks=pytest.mark.study), ("1.0", 1)])
 def test_a_rig_fails_by_a_limit_that_is_not_kept(
     limit: str, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
