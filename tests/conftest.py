@@ -44,8 +44,8 @@ if os.environ.get("BRAKE_ECU_TEST_LIBRARY") == "0":
         jit.library(package)
     del os.environ["BRAKE_ECU_LIBRARY"]
 
-LONG = re.compile(r"tests/(system/|test_|brakelab/(identify|fleet|report)/)")
-"""Files whose tests run processes, trainings or browsers."""
+LONG = re.compile(r"tests/(system/|test_|golden/|wide_world/|brakelab/(identify|fleet|report|studies)/)")
+"""Files whose tests run processes, trainings, studies or browsers."""
 
 CHECKOUT = Path(__file__).parent.parent
 
