@@ -34,6 +34,7 @@ test: .venv/dev
 	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m "not study" $(ARGS)
 
 studies: .venv/dev
+	@.venv/bin/python -m brakelab.build
 	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m study $(ARGS)
 
 check: .venv/dev
