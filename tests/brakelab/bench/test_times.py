@@ -27,6 +27,8 @@ from ecu.contract.signals import INPUT
 from ecu.errors import UserError
 from ecu.settings.resources import resource
 
+pytestmark = pytest.mark.study
+
 FIGURE = Figure(2.0, 1.0, 4.0)
 
 
@@ -40,7 +42,6 @@ def assert_sane(rows: list[Row], names: set[str]) -> None:
 
 
 @pytest.mark.parametrize("kind", [NumpyFilters, FilterpyFilters])
-@pytest.mark.study
 def test_all_filters_find_the_same_friction(kind: Any) -> None:
     if kind is FilterpyFilters:
         pytest.importorskip("filterpy")
@@ -194,7 +195,6 @@ def test_unknown_bench_names_those_there_are() -> None:
         command.bench("steps")
 
 
-@pytest.mark.study
 def test_replay_tables() -> None:
     replay = pytest.importorskip("brakelab.bench.replay")
     reading, whole = replay.replay_tables(rounds=1, scenario="stop-2", part_s=1.0)
