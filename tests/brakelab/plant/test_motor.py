@@ -87,3 +87,11 @@ def test_a_motor_loses_most_at_the_ends_of_its_map(
 
 def test_without_current_nothing_is_lost(shipped: Maker) -> None:
     assert motor_loss(shipped("suv14", 10.0).params[0], 0.5, 100.0) == 0.0
+
+
+def test_a_torque_that_decays_ends_at_zero(shipped: Maker) -> None:
+    car = shipped("suv14", 10.0)
+    car.state["wheel_speed"] = 20.0
+    ask(car, 1000.0, 0.1)
+    assert 0.0 < ask(car, 0.0, 0.1)[-1] < 1e-12
+    assert ask(car, 0.0, 2.0)[-1] == 0.0

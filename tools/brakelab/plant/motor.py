@@ -21,6 +21,7 @@ TIME_CONSTANT: Final = 0.0022  # s (A.16)
 DEAD_TIME: Final = 0.0022  # s (A.16)
 RECOVERY: Final = 1.0 / 3.0  # s of peak regained per second at or below the nominal torque. Assumption
 PEAK_FADE: Final = 1.0  # s of reserve. Assumption
+NOTHING: Final = 1e-100  # N m, below which a torque that decays is zero: subnormal numbers are slow
 EXCITED: Final = 1.0  # N m at the wheel, from which on a motor has current
 
 
@@ -64,6 +65,6 @@ def advance_motors(params: Record, state: Record, dt: float) -> None:
         charge_limit = min(limit, params.charge_limit / (max(speed, 1.0) * max(motors, 1)))
         state.motor_limit[wheel] = charge_limit * min(speed / params.motor_fade_speed, 1.0)
         target = min(max(state.motor_history[asked, wheel], -drive_limit), state.motor_limit[wheel])
-        state.motor_torque[wheel] += (1.0 - math.exp(-dt / TIME_CONSTANT)) * (
-            target - state.motor_torque[wheel]
-        )
+        torque = state.motor_torque[wheel]
+        torque += (1.0 - math.exp(-dt / TIME_CONSTANT)) * (target - torque)
+        state.motor_torque[wheel] = torque if abs(torque) > NOTHING else 0.0
