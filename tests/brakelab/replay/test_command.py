@@ -350,7 +350,6 @@ WORTHLESS: dict[str, tuple[dict[str, float | None], list[str]]] = {
         [
             "accel_x: not mapped; the change of speed stands for it",
             NO_SPEED,
-            "degraded or failed for 87 % of the drive: IMU lost (87 %)",
         ],
     ),
     "pedal from 0 to 1023, demand right": (
