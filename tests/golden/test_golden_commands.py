@@ -87,7 +87,15 @@ def dust() -> list[str]:
     return ["dust", "manifest.csv"]
 
 
-@pytest.mark.parametrize("campaign", [vehicle, thermal, wear, dust])
+@pytest.mark.parametrize(
+    "campaign",
+    [
+        pytest.param(vehicle, marks=pytest.mark.study),
+        thermal,
+        pytest.param(wear, marks=pytest.mark.study),
+        dust,
+    ],
+)
 def test_what_identify_writes(
     campaign: Callable[[], list[str]],
     tmp_path: Path,
