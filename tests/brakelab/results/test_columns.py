@@ -1,11 +1,15 @@
 """Columns of a drive, read when they are asked for."""
 
+from pathlib import Path
+
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from brakelab.report.drive import DriveResult
 from brakelab.results import columns as module
-from brakelab.results.columns import Columns
+from brakelab.results.columns import Columns, open_columns
 
 ROWS = 100
 
@@ -30,3 +34,12 @@ def test_the_last_columns_are_kept(monkeypatch: pytest.MonkeyPatch, kept: int, a
 def test_a_drive_without_columns_holds_no_number_of_them() -> None:
     drive = DriveResult(np.arange(3.0), {"a": np.ones(3), "b": np.ones(3)}, {}).without({"a"})
     assert (drive.has("a"), drive.has("b"), list(drive.columns)) == (False, True, ["b"])
+
+
+def test_a_file_whose_name_is_gone_is_read_on(tmp_path: Path) -> None:
+    path = tmp_path / "drive.parquet"
+    pq.write_table(pa.table({"t": [0.0, 0.01], "word": ["a", None]}), path)
+    stored = open_columns(path, "give another")
+    path.unlink()
+    assert stored.numbers("t").tolist() == [0.0, 0.01]
+    assert stored.columns["word"].tolist() == ["a", None]

@@ -71,12 +71,16 @@ class Stored(NamedTuple):
 
 
 def open_columns(path: Path, remedy: str, required: Iterable[str] = ()) -> Stored:
-    """Open a Parquet file.
+    """Open a Parquet file; what is open can be read when its name is gone, too.
 
     Raises:
         UserError: it is missing, for other programs, or lacks a column of `required`; it cannot be read, now
             or when a column is.
     """
+    if path.suffix in EXPORTS:
+        raise UserError(str(path), "", "results are read from Parquet; `replay` with --out RESULT.parquet")
+    if not path.is_file():
+        raise UserError(str(path), "no such file", remedy)
     with _readable(path, remedy):
         file = pq.ParquetFile(path)
 
@@ -97,10 +101,6 @@ def open_columns(path: Path, remedy: str, required: Iterable[str] = ()) -> Store
 
 @contextmanager
 def _readable(path: Path, remedy: str) -> Iterator[None]:
-    if path.suffix in EXPORTS:
-        raise UserError(str(path), "", "results are read from Parquet; `replay` with --out RESULT.parquet")
-    if not path.is_file():
-        raise UserError(str(path), "no such file", remedy)
     try:
         yield
     except (pa.ArrowException, OSError, ValueError) as error:
