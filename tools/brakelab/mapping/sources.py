@@ -99,9 +99,9 @@ def _compared(one: Series, other: Series, correlation: float) -> str:
 def undecided(found: list[Found], series: list[Series], motion: Motion, car: Car) -> list[Source]:
     """Return candidates of the wanted inputs for which nothing was found, the likeliest first."""
     targets, used = {one.target for one in found}, {one.series.name for one in found}
-    counts = COUNTING | CHECKING
+    other = COUNTING | CHECKING
     free = [
-        one for one in series if one.name not in used and not one.sign and not counts & {*words(one.signal)}
+        one for one in series if one.name not in used and not one.sign and not other & {*words(one.signal)}
     ]
     sources = []
     for target, reference in references(motion, car).items():

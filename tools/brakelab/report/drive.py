@@ -56,17 +56,9 @@ def read_drive(path: Path, required: tuple[str, ...], remedy: str) -> DriveResul
         raise UserError(str(path), f"column t, row {row}", "time must be finite and increase from row to row")
     for name in required:
         stored.numbers(name)
-    numeric = [
-        field.name
-        for field in stored.schema
-        if field.name != "t"
-        and (
-            pa.types.is_integer(field.type)
-            or pa.types.is_floating(field.type)
-            or pa.types.is_boolean(field.type)
-        )
-    ]
-    return DriveResult(t, Columns(numeric, stored.columns.__getitem__), stored.metadata)
+    kinds = pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean
+    others = {field.name for field in stored.schema if not any(kind(field.type) for kind in kinds)}
+    return DriveResult(t, stored.columns, stored.metadata).without({"t", *others})
 
 
 def start_ns(drive: DriveResult) -> int | None:

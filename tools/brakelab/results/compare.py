@@ -51,7 +51,6 @@ EXACT: Final = (
 BRAKES: Final = "brake applications"
 PROVENANCE: Final = ("version", "vehicle", "observer", "config_hash", "database_hash", "inputs")
 
-
 Named = Mapping[str, NDArray[Any]]
 
 
@@ -161,7 +160,7 @@ def _threshold(name: str, unit: str, values: NDArray[np.float64]) -> float:
 def differences(a: Named, b: Named, units: Mapping[str, str]) -> list[Difference]:
     """Return the differences of columns common to both, largest first; equal ones are omitted.
 
-    Named are float64 of one length; two NaN are equal.
+    Columns are float64 of one length; two NaN are equal.
     """
     found = []
     for name in a:
