@@ -1,12 +1,15 @@
 """No command writes over what it reads, by whatever name; TOML is written to names that end in .toml."""
 
+import errno
 import re
 import shutil
 from pathlib import Path
 
 import pytest
 
+from brakelab.results.outputs import whole, write_text
 from ecu import cli
+from ecu.errors import UserError
 from ecu.settings.resources import resource
 
 OVERWRITING = {
@@ -103,3 +106,41 @@ def test_toml_is_written_to_a_name_that_says_so(
     assert cli.main(line.split()) == 2
     assert "--out: car.txt: is written as TOML; let the name end in .toml" in capsys.readouterr().err
     assert not (folder / "car.txt").exists()
+
+
+@pytest.mark.parametrize(
+    ("mistake", "says"),
+    [
+        (
+            OSError(errno.ENOSPC, "of pyarrow"),
+            "page.html: cannot be written (No space left on device); choose",
+        ),
+        (KeyboardInterrupt("by Ctrl-C"), "by Ctrl-C"),
+    ],
+)
+def test_an_output_is_whole_or_as_it_was(tmp_path: Path, mistake: BaseException, says: str) -> None:
+    out = tmp_path / "sub" / "page.html"
+    write_text(out, "before")
+
+    def fail() -> None:
+        with whole(out) as part:
+            part.write_text("hal")
+            raise mistake
+
+    with pytest.raises((UserError, KeyboardInterrupt), match=re.escape(says)):
+        fail()
+    assert out.read_text() == "before"
+    assert [*out.parent.iterdir()] == [out]
+
+
+def test_an_output_that_is_a_pipe_is_written_to() -> None:
+    with pytest.raises(UserError, match="/dev/full: cannot be written"):
+        write_text(Path("/dev/full"), "text")
+    assert Path("/dev/full").is_char_device()
+
+
+def test_an_output_that_is_a_link_stays_one(tmp_path: Path) -> None:
+    (tmp_path / "link.html").symlink_to(tmp_path / "page.html")
+    write_text(tmp_path / "link.html", "text")
+    assert (tmp_path / "link.html").is_symlink()
+    assert (tmp_path / "page.html").read_text() == "text"

@@ -3,7 +3,6 @@
 import platform
 import tempfile
 import zipfile
-from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -12,6 +11,7 @@ from brakelab.fmu.ecu_unit import ecu_unit
 from brakelab.fmu.source import c_source
 from brakelab.fmu.unit import Unit
 from brakelab.fmu.vehicle_unit import vehicle_unit
+from brakelab.results.outputs import whole
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.scenario_car import with_car, with_draw
 from ecu.building.c_compiler import compile_shared
@@ -88,19 +88,10 @@ def write_fmu(unit: Unit, out: Path, version: Version) -> None:
             **{f"{binaries}/{file}": (library.folder / file).read_bytes() for file in kernels.values()},
             "resources/origin.json": unit.origin.encode(),
         }
-    part = out.with_name(f".{out.name}.part")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as fmu:
-            for name, content in files.items():
-                entry = zipfile.ZipInfo(name, ZIP_EPOCH)
-                entry.external_attr = (0o755 if name.endswith(".so") else 0o644) << 16
-                fmu.writestr(entry, content, zipfile.ZIP_DEFLATED)
-        part.replace(out)
-    except OSError as error:
-        raise UserError(str(out), "", f"cannot be written ({error.strerror}); choose another --out") from None
-    finally:
-        with suppress(OSError):
-            part.unlink()
+    with whole(out) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as fmu:
+        for name, content in files.items():
+            entry = zipfile.ZipInfo(name, ZIP_EPOCH)
+            entry.external_attr = (0o755 if name.endswith(".so") else 0o644) << 16
+            fmu.writestr(entry, content, zipfile.ZIP_DEFLATED)
     give(processors=list(kernels), variables=len(unit.variables))
     wrote(out)

@@ -8,6 +8,7 @@ unit, the schema's metadata the provenance (version, hashes, start, quality of t
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, NamedTuple
@@ -21,11 +22,11 @@ from brakelab.arrays import arrow_array
 from brakelab.results import mcap_file, mdf
 from brakelab.results.brakes import BRAKE_UNITS, BrakeBook, BrakeRow
 from brakelab.results.columns import EXPORTS, open_columns
+from brakelab.results.outputs import cannot_write, unfinished, whole
 from brakelab.results.pads import KEY, PadState, packed
 from brakelab.results.row import MEASURED_INPUTS
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import INPUT_SIGNALS, OUTPUT_COLUMNS, OUTPUT_SIGNALS, column_names
-from ecu.errors import UserError
 
 MEASURED: Final = tuple(INPUT_SIGNALS[place] for place in MEASURED_INPUTS)
 """Inputs that a reader needs beside the outputs, as last received."""
@@ -114,7 +115,7 @@ class ResultWriter:
         self.frames: Iterable[mcap_file.Frames] = ()
         """Of the logs, for a result as MCAP; read when everything else is complete."""
         self.rows = 0
-        self._unfinished = path.with_name(f".{path.name}.unfinished")
+        self._unfinished = unfinished(path.with_suffix(".parquet"))
         self._file: pq.ParquetWriter | None = None
         self._side = ThreadPoolExecutor(1, "brake-ecu writes rows")
         self._writing: Future[None] | None = None
@@ -134,7 +135,10 @@ class ResultWriter:
         """Wait for the rows that are being written; raise what that raised."""
         writing, self._writing = self._writing, None
         if writing is not None:
-            writing.result()
+            try:
+                writing.result()
+            except OSError as error:
+                raise cannot_write(self.path, error) from None
 
     def restart(self) -> None:
         """Forget what was written: the rows come once more."""
@@ -152,7 +156,7 @@ class ResultWriter:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
                 self._file = pq.ParquetWriter(self._unfinished, schema, **_QUICK)
             except OSError as error:
-                raise _not_written(self.path, error) from None
+                raise cannot_write(self.path, error) from None
         return self._file
 
     def __enter__(self) -> "ResultWriter":
@@ -160,34 +164,33 @@ class ResultWriter:
 
     def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
         self._side.shutdown()
-        failed = self._writing.exception() if self._writing is not None else None
-        if kind is not None or failed is not None:
-            if self._file is not None:
-                self._file.close()
-            self._unfinished.unlink(missing_ok=True)
-            if kind is None and failed is not None:
-                raise failed
-            return
+        try:
+            if kind is None:
+                self._wait()
+                self._finish()
+        except OSError as failed:
+            raise cannot_write(self.path, failed) from None
+        finally:
+            with suppress(OSError):  # of a full disk that already has its line
+                if self._file is not None:
+                    self._file.close()
+            with suppress(OSError):
+                self._unfinished.unlink(missing_ok=True)
+
+    def _finish(self) -> None:
         file = self._open()
         file.add_key_value_metadata({"quality": json.dumps(self.quality), KEY: json.dumps(packed(self.pads))})
         file.close()
         self.brakes.end_log()
         table = brakes_table(self.brakes.rows).replace_schema_metadata(_encoded(self.provenance))
-        if self.path.suffix in EXPORTS:
-            try:
-                if self.path.suffix == mdf.SUFFIX:
-                    mdf.write_mdf(self._unfinished, table, self.path)
-                else:
-                    mcap_file.write_mcap(self._unfinished, table, self.frames, self.path)
-            finally:
-                self._unfinished.unlink()
-            return
-        pq.write_table(table, brakes_path(self.path), compression="zstd")
-        self._unfinished.replace(self.path)
-
-
-def _not_written(path: Path, error: OSError) -> UserError:
-    return UserError(str(path), "", f"cannot be written ({error.strerror or error}); choose another --out")
+        if self.path.suffix == mdf.SUFFIX:
+            mdf.write_mdf(self._unfinished, table, self.path)
+        elif self.path.suffix == mcap_file.SUFFIX:
+            mcap_file.write_mcap(self._unfinished, table, self.frames, self.path)
+        else:
+            with whole(brakes_path(self.path)) as part:
+                pq.write_table(table, part, compression="zstd")
+            self._unfinished.replace(self.path)
 
 
 class Result(NamedTuple):

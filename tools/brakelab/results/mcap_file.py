@@ -16,6 +16,7 @@ from typing import Any, Final, NamedTuple
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from brakelab.results.outputs import whole
 from ecu import __version__
 from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
 from ecu.contract.signals import CORNERS, topic_of
@@ -61,8 +62,7 @@ def load_mcap(path: Path) -> Any:
 def write_mcap(rows: Path, brakes: pa.Table, frames: Iterable[Frames], out: Path) -> None:
     """Write the finished Parquet file `rows`, the applications `brakes` and the `frames` as `out`."""
     writer_of = load_mcap(out)
-    unfinished = out.with_name(f".{out.stem}.unfinished{SUFFIX}")
-    with pq.ParquetFile(rows) as source, unfinished.open("wb") as stream:
+    with whole(out) as part, pq.ParquetFile(rows) as source, part.open("wb") as stream:
         metadata = {key.decode(): value.decode() for key, value in (source.metadata.metadata or {}).items()}
         metadata.pop("ARROW:schema", None)
         start_ns = int(metadata.get("start_time_ns", 0))
@@ -86,7 +86,6 @@ def write_mcap(rows: Path, brakes: pa.Table, frames: Iterable[Frames], out: Path
             data = json.dumps(message.content, separators=(",", ":")).encode()
             writer.add_message(channels[message.topic], time_ns, data, time_ns)
         writer.finish()
-    unfinished.replace(out)
 
 
 def _described(field: "pa.Field[Any]") -> tuple[str, str]:

@@ -17,6 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from brakelab.results.outputs import whole
 from ecu.errors import UserError
 
 SUFFIX: Final = ".mf4"
@@ -38,8 +39,7 @@ def load_asammdf(path: Path) -> Any:
 def write_mdf(rows: Path, brakes: pa.Table, out: Path) -> None:
     """Write the finished Parquet file `rows` and the applications `brakes` as `out`."""
     asammdf = load_asammdf(out)
-    unfinished = out.with_name(f".{out.stem}.unfinished{SUFFIX}")
-    with pq.ParquetFile(rows) as source, asammdf.MDF(version="4.10") as mdf:
+    with whole(out) as part, pq.ParquetFile(rows) as source, asammdf.MDF(version="4.10") as mdf:
         metadata = {key.decode(): value.decode() for key, value in (source.metadata.metadata or {}).items()}
         metadata.pop("ARROW:schema", None)
         groups = (source.read_row_group(place) for place in range(source.num_row_groups))
@@ -49,8 +49,7 @@ def write_mdf(rows: Path, brakes: pa.Table, out: Path) -> None:
         start = metadata.get("start_time_ns")
         mdf.header.abs_time = int(start) - round(first * 1e9) if start else 0
         mdf.header.time_flags = mdf.header.tz_offset = mdf.header.daylight_save_time = 0  # UTC
-        mdf.save(unfinished, overwrite=True, compression=_TRANSPOSED_DEFLATE)
-    unfinished.replace(out)
+        mdf.save(part, overwrite=True, compression=_TRANSPOSED_DEFLATE)
 
 
 def _append(asammdf: Any, mdf: Any, tables: Iterator[pa.Table], master: str, name: str) -> float:

@@ -1,10 +1,12 @@
 """Output files of a command: none may be a folder, an input or somebody else's; TOML has its ending.
 
 A command may renew what it wrote. What stands beside its first output is its own only if that one is there.
+An output is whole, or as it was before: `whole`.
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ecu.errors import UserError
@@ -35,14 +37,42 @@ def check_outputs(
         raise UserError(option, str(out), remedy)
 
 
+def cannot_write(out: Path, error: OSError, option: str = "--out") -> UserError:
+    """Return what a user reads where `out`, given by `option`, failed with `error`."""
+    reason = os.strerror(error.errno) if error.errno else str(error)  # pyarrow's own text is two lines
+    return UserError(str(out), "", f"cannot be written ({reason}); choose another {option}")
+
+
+def unfinished(out: Path) -> Path:
+    """Return where this process writes `out` before it is whole: beside it, with the same ending."""
+    return out.with_name(f".{out.stem}.{os.getpid()}{out.suffix}")
+
+
+@contextmanager
+def whole(out: Path, option: str = "--out") -> Iterator[Path]:
+    """Yield where to write `out`, which appears at the end of the block or stays as it was; make its folder.
+
+    A device or pipe is written to itself. Raises UserError if it cannot be written.
+    """
+    place = Path(os.path.realpath(out))
+    part = place if place.exists() and not place.is_file() else unfinished(place)
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        yield part
+        if part != place:
+            part.replace(place)
+    except OSError as error:
+        raise cannot_write(out, error, option) from None
+    finally:
+        if part != place:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
+
+
 def write_text(out: Path, text: str, option: str = "--out") -> None:
     """Write the text of an output, and its folder. Raises UserError if it cannot be written."""
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        remedy = f"cannot be written ({error.strerror}); choose another {option}"
-        raise UserError(str(out), "", remedy) from None
+    with whole(out, option) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def _same(one: Path, other: Path) -> bool:

@@ -1,5 +1,6 @@
 """`brake-ecu simulate`: a scenario in closed loop; frames, decoded inputs and true values as files."""
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -10,14 +11,13 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import arrow_array
 from brakelab.logs.candump_text import candump_text
-from brakelab.results.outputs import check_outputs
+from brakelab.results.outputs import check_outputs, whole
 from brakelab.results.progress import progress_bar
 from brakelab.simulation.closed_loop import START_NS, VEHICLE_BUS, new_loop, run_blocks
 from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.scenario_car import other_car, with_draw, with_plant_for
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS, N_OUTPUTS
-from ecu.errors import UserError
 from ecu.output import give, say, wrote
 from ecu.settings.config import Config, load_config
 from ecu.settings.resources import command_name
@@ -94,9 +94,9 @@ def simulate(
     frames = 0
     with progress_bar("simulate", None, printed):
         loop = new_loop(driven, vehicle, seed)
-        try:
-            out.parent.mkdir(parents=True, exist_ok=True)
-            with log.open("wb") as text:
+        with ExitStack() as files:
+            parts = [files.enter_context(whole(path)) for path in (log, inputs, truth)]
+            with parts[0].open("wb") as text:
                 for block in run_blocks(loop):
                     text.write(candump_text(block.frames, VEHICLE_BUS))
                     decoded.append(block.decoded.copy())
@@ -105,11 +105,8 @@ def simulate(
                         outputs.append(block.outputs.copy())
                     frames += len(block.frames)
             t = np.arange(sum(map(len, true)), dtype=np.float64) * (1e-9 * CYCLE_NS)
-            for path, names, blocks in ((inputs, SIGNALS, decoded), (truth, TRUTH_COLUMNS, true)):
+            for path, names, blocks in ((parts[1], SIGNALS, decoded), (parts[2], TRUTH_COLUMNS, true)):
                 write_columns(path, t, dict(zip(names, np.concatenate(blocks).T, strict=True)), metadata)
-        except OSError as error:
-            remedy = f"cannot be written ({error.strerror}); choose another --out"
-            raise UserError(str(out), "", remedy) from None
     if printed:
         give(seconds=float(t[-1]), frames=frames)
         again = f"brake-ecu replay {log} --config {command_name(config)} --out {out}.result.parquet"
