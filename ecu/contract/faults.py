@@ -106,7 +106,7 @@ FAULTS: Final = (
     Fault(FOREIGN_SENDER, "foreign sender", "someone else sends one of our identifiers", "stop the other sender"),
     Fault(SEND_FAILED, "send failed", "the kernel refused a frame", "raise txqueuelen; check the bus load"),
     Fault(FRAMES_DROPPED, "frames dropped", "the kernel dropped received frames", "check the load of the machine"),
-    Fault(LATE, "late", "a cycle missed its deadline", "see `brake-ecu doctor` for real-time rights"),
+    Fault(LATE, "late", "a cycle missed its deadline", "a `slow` line of the log names the stage that took too long; without one the loop woke late: see `brake-ecu doctor` for real-time rights"),
     Fault(COMPILED, "compiled in operation", "a kernel was compiled after the start", "warm the cache: python -m ecu.warm"),
     Fault(MOTOR_SHORT, "motor gives less than demanded", "a motor gave less than demanded within the limit that it reports: the linings brake in its place until the brakes are released", "compare motor_demand, motor_torque and motor_limit of that wheel; check the inverter"),
     Fault(PRESSURE_NOT_FOLLOWING, "pressure does not follow demand", "a calliper pressure is not what was demanded while the three others are: it is not used, that of the other side stands for it", "check that wheel's pressure sensor and valve, and the receiver of PressureDemand*"),

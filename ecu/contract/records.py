@@ -156,6 +156,8 @@ LEARNED: Final = np.dtype(
     align=True,
 )
 STAGES: Final = ("drain", "receive", "step", "transmit", "send")
+STAGE_SHARES_NS: Final = (2_000_000, 2_000_000, 2_000_000, 1_000_000, 2_000_000)
+"""Of a cycle: four times what 99 % take on a busy machine, and more; together they leave a tenth."""
 
 
 def e2e_counts(cycle: RecordArray) -> dict[str, int]:

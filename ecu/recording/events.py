@@ -8,7 +8,7 @@ import numpy as np
 import structlog
 
 from ecu.contract.faults import E2E_REJECTIONS, FAULTS, fault_mask
-from ecu.contract.records import RecordArray, e2e_counts
+from ecu.contract.records import STAGE_SHARES_NS, STAGES, RecordArray, e2e_counts
 from ecu.contract.signals import STARTING
 from ecu.recording.log import Throttle
 
@@ -75,6 +75,7 @@ class EventLog:
         if (set_ns := int(last["clock_set_ns"])) != self._clock_set_ns:
             self._say("clock_set", by_s=(set_ns - self._clock_set_ns) / 1e9, since_start_s=set_ns / 1e9)
             self._clock_set_ns = set_ns
+        self._look_at_stages(cycles)
         if overruns > self._overruns:
             self._say("missed", missed=overruns - self._overruns, total=overruns)
             self._overruns = overruns
@@ -84,6 +85,22 @@ class EventLog:
         if lost_cycles + lost_frames > self._lost:
             self._say("ring_overtaken", lost_cycles=lost_cycles, lost_frames=lost_frames)
             self._lost = lost_cycles + lost_frames
+
+    def _look_at_stages(self, cycles: RecordArray) -> None:
+        """Name each stage that took more than its share, with the worst cycle."""
+        taken = cycles["stage_ns"]
+        beyond = taken > STAGE_SHARES_NS
+        for place in np.flatnonzero(beyond.any(axis=0)):
+            worst = int(taken[:, place].argmax())
+            self._say(
+                "slow",
+                STAGES[place],
+                cycle=int(cycles["number"][worst]),
+                stage=STAGES[place],
+                took_ms=taken[worst, place] / 1e6,
+                share_ms=STAGE_SHARES_NS[place] / 1e6,
+                cycles=int(beyond[:, place].sum()),
+            )
 
     def _look_at(self, record: RecordArray, mode: int, faults: int) -> None:
         cycle, frames = int(record["number"][0]), e2e_counts(record)
@@ -108,6 +125,7 @@ class EventLog:
             content["held_back"] = held
         serious = event in (
             "missed",
+            "slow",
             "frames_dropped",
             "ring_overtaken",
             "fault",

@@ -96,6 +96,9 @@ def _sentence(event: str, content: dict[str, Any]) -> str:
             return f"{content['fault']}{_counted(content)}: gone"
         case "missed":
             return f"periods missed: {content['missed']}, in all {content['total']}"
+        case "slow":
+            took = f"{content['stage']} took {content['took_ms']:.1f} ms"
+            return f"slow: {took}, its share is {content['share_ms']:g} ms"
         case "clock_set":
             return f"the machine's clock was set by {content['by_s']:+g} s"
         case "frames_dropped":

@@ -71,6 +71,13 @@ def families(tally: Tally) -> Iterator["Metric"]:
         "Time in the stages of the cycle",
         zip(STAGES, tally.stages_s, strict=True),
     )
+    yield _labelled(
+        CounterMetricFamily,
+        "stage_overruns",
+        "stage",
+        "Cycles in which a stage took more than its share",
+        zip(STAGES, tally.stages_slow, strict=True),
+    )
     yield from _frames(tally)
     yield from _state(outputs)
     yield from _inputs(tally)

@@ -14,7 +14,7 @@ from ecu.bus.freshness import begin_cycle
 from ecu.bus.receive import Reception, new_reception, receive
 from ecu.bus.receive_plan import ReceivePlan
 from ecu.bus.signal_map import receive_plan
-from ecu.contract.records import INPUTS, STAGES, RecordArray, new_record
+from ecu.contract.records import INPUTS, STAGE_SHARES_NS, STAGES, RecordArray, new_record
 from ecu.contract.signals import CYCLE_NS
 from ecu.errors import UserError
 from ecu.recording.ring import Batch, RingReader
@@ -37,6 +37,7 @@ class Tally:
         self.lateness: NDArray[np.int64] = np.zeros(len(EDGES_S) + 1, np.int64)
         self.lateness_sum_s = 0.0
         self.stages_s = np.zeros(len(STAGES))
+        self.stages_slow: NDArray[np.int64] = np.zeros(len(STAGES), np.int64)
         self.late_frames = 0
         self.plan: ReceivePlan | None = None
         self.reception: Reception | None = None
@@ -59,6 +60,7 @@ class Tally:
         self.lateness += np.bincount(np.searchsorted(EDGES_S, late_s), minlength=len(self.lateness))
         self.lateness_sum_s += float(late_s.sum())
         self.stages_s += cycles["stage_ns"].sum(axis=0) * 1e-9
+        self.stages_slow += (cycles["stage_ns"] > STAGE_SHARES_NS).sum(axis=0)
         self.late_frames += int(cycles["late_frames"].sum())
         self.last = batch.records[-1:]
         if self.plan is not None and self.reception is not None and len(batch.frames):

@@ -87,6 +87,7 @@ def test_every_quantity_with_its_unit(one):
     assert {key for key, value in samples["brake_ecu_fault"].items() if value} == {("IMU lost",), ("late",)}
     assert len(samples["brake_ecu_fault"]) == len(FAULTS)
     assert len(samples["brake_ecu_stage_seconds_total"]) == 5
+    assert len(samples["brake_ecu_stage_overruns_total"]) == 5
 
 
 def test_frames_by_message(one, contract_frames):
