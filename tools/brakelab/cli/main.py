@@ -88,6 +88,7 @@ def vehicle(
     config: Annotated[Path | None, CONFIG_OPTION] = None,
     truth: Annotated[Path | None, option("FILE.parquet", "True values of the drive, to write")] = None,
     alone: Annotated[bool, flag("--alone", "Set off at once, without waiting for an ECU")] = False,
+    by_hand: Annotated[bool, flag("--by-hand", "Take faults from standard input: lost message=Imu")] = False,
     bus_goes_off: Annotated[bool, Option("--bus-goes-off", hidden=True)] = False,
 ) -> None:
     """Drive the simulated car of a scenario alone on a bus.
@@ -97,7 +98,7 @@ def vehicle(
     from brakelab.rig import vehicle_node
 
     bus = interface, channel
-    vehicle_node.vehicle_command(scenario, bus, seed, plant, config, truth, alone, bus_goes_off)
+    vehicle_node.vehicle_command(scenario, bus, seed, plant, config, truth, alone, by_hand, bus_goes_off)
 
 
 @app.command()

@@ -8,6 +8,7 @@ and on the frames of both directions.
 """
 
 import signal
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -21,6 +22,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from brakelab.plant.driver import drive
+from brakelab.rig.by_hand import Hand, with_room
 from brakelab.simulation.closed_loop import Plans, plans
 from brakelab.simulation.fault_kernels import Link, deliver, new_link
 from brakelab.simulation.priority import ask_for_priority
@@ -146,16 +148,22 @@ def live_through(
     return int(deliver(vehicle.faults, side.to_ecu, t, noise, side.frames_out, count))
 
 
+def nobody(t: float) -> None:
+    """Let nobody type a fault."""
+
+
 def drive_in_real_time(
     node: Node,
     channel: Channel,
     source: TimeSource,
     stopped: Callable[[], bool] = lambda: False,
     set_off: Callable[[int], None] = lambda t_mono_ns: None,
+    by_hand: Callable[[float], None] = nobody,
 ) -> Truth:
     """Drive the node's scenario on `channel` to its end, or until `stopped`.
 
-    `set_off` is called with T_0 on the monotonic clock. In missed periods the car advances without sending.
+    `set_off` is called with T_0 on the monotonic clock, `by_hand` before each cycle with its t [s]. In missed
+    periods the car advances without sending.
     """
     side = node.side
     grid = Grid(source)
@@ -168,6 +176,7 @@ def drive_in_real_time(
         periods = tick.missed + 1 if rows else 1
         cycle += periods if rows else 0
         start_ns = start_ns or tick.t_ns
+        by_hand(1e-9 * cycle * CYCLE_NS)
         received = channel.drain(side.frames_in, 0)
         row = np.empty(N_TRUTH)
         now_ns = source.realtime_ns()
@@ -188,7 +197,12 @@ def wait_for_ecu(node: Node, channel: Channel, stopped: Callable[[], bool]) -> N
 
 
 def stay_with_ecu(
-    node: Node, channel: Channel, source: TimeSource, cycle: int, stopped: Callable[[], bool]
+    node: Node,
+    channel: Channel,
+    source: TimeSource,
+    cycle: int,
+    stopped: Callable[[], bool],
+    by_hand: Callable[[float], None] = nobody,
 ) -> None:
     """Let the car go on from `cycle` with its brakes as they are until the ECU falls silent, or `stopped`."""
     side, grid, row, silent = node.side, Grid(source), np.empty(N_TRUTH), 0
@@ -196,6 +210,7 @@ def stay_with_ecu(
         periods, received = grid.wait().missed + 1, channel.drain(side.frames_in, 0)
         cycle += periods
         silent = 0 if received else silent + periods
+        by_hand(1e-9 * cycle * CYCLE_NS)
         at_ns = source.realtime_ns()
         count = live_through(plans(), side, node.noise, at_ns, received, periods, cycle, row, True)
         channel.send(side.to_ecu.arrived, count)
@@ -237,11 +252,13 @@ def vehicle_command(
     config: Path | None,
     truth_file: Path | None,
     alone: bool,
+    by_hand: bool,
     bus_goes_off: bool,
 ) -> None:
     """Drive the simulated car of a scenario on a `bus` (interface, channel), to its end or a signal's.
 
-    `alone`: without waiting for an ECU. `bus_goes_off`: faults of the kind bus_off are the bus's affair.
+    `alone`: without waiting for an ECU. `by_hand`: with faults from standard input. `bus_goes_off`: faults of
+    the kind bus_off are the bus's affair.
 
     Raises:
         UserError: the scenario or its car is wrong, the bus or the file of the truth cannot be opened.
@@ -261,6 +278,10 @@ def vehicle_command(
         scenario = with_car(scenario, plant, config, Path(folder))
         warm_up(scenario)
         node = new_node(scenario, seed)
+    take: Callable[[float], None] = nobody
+    if by_hand:
+        side = node.side._replace(vehicle=with_room(node.side.vehicle))
+        node, take = node._replace(side=side), Hand(side.vehicle, sys.stdin).take
     listened = [int(identifier) for identifier in plans().vehicle_hears.ids]
     channel = open_channel(*bus, receive_ids=listened)
     ask_for_priority()
@@ -268,13 +289,13 @@ def vehicle_command(
     source, stopped = system_time(), lambda: bool(stop)
     if not alone:
         wait_for_ecu(node, channel, stopped)
-    truth = drive_in_real_time(node, channel, source, stopped, _tell_set_off)
+    truth = drive_in_real_time(node, channel, source, stopped, _tell_set_off, take)
     with ThreadPoolExecutor(1) as beside:  # a car that writes is no car that is silent
         written: Future[None] | None = None
         if truth_file is not None:
             written = beside.submit(write_truth_file, truth_file, truth, path.stem, seed)
         if not alone:
-            stay_with_ecu(node, channel, source, len(truth.t), partial(_ends, stop, written))
+            stay_with_ecu(node, channel, source, len(truth.t), partial(_ends, stop, written), take)
     if written is not None:
         written.result()
     channel.close()
