@@ -63,6 +63,7 @@ def test_of_a_fleet_without_one_good_drive_each_reason_is_said(
     printed = capsys.readouterr()
     assert printed.err.count("failed: ") == 2
     assert "0 of 2 drives of 2 vehicles" in printed.out
+    assert "; 0 replayed now, 2 failed," in printed.out
     assert "Drives that failed" in (tmp_path / "out" / "report.html").read_text("utf-8")
 
 

@@ -67,7 +67,7 @@ def fleet(
         try:
             for planned, summary, new in run_fleet(crew, chains, out, rows):
                 done.append(summary)
-                replayed += new
+                replayed += new and not summary["fault"]
                 advance(planned.size)
         except KeyboardInterrupt:
             interrupted = True
@@ -129,8 +129,9 @@ def _tell(done: Sequence[dict[str, Any]], replayed: int, total: int, out: Path) 
     kilometres = sum(summary.get("distance") or 0.0 for summary in done) / 1000.0
     vehicles = len({summary["vehicle"] for summary in done})
     print(
-        f"{out}: {len(done) - len(faults)} of {total} drives of {vehicles} vehicles, {hours:.1f} h, "
-        f"{kilometres:.0f} km; {replayed} replayed now, {len(faults)} failed, {noted} with notes on the log"
+        f"{out}: {len(done) - len(faults)} of {total} drives of {vehicles} vehicle"
+        f"{'s' * (vehicles != 1)}, {hours:.1f} h, {kilometres:.0f} km; {replayed} replayed now, "
+        f"{len(faults)} failed, {noted} with notes on the log"
     )
     give(drives=total, done=len(done) - len(faults), replayed=replayed, with_notes=noted)
     give(vehicles=vehicles, hours=hours, kilometres=kilometres, failed=[one["fault"] for one in faults])
