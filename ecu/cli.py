@@ -20,6 +20,7 @@ if is_run(sys.argv[1:]):  # under load, importing the command line alone would t
 import atexit
 import errno
 import gc
+import io
 import traceback
 from functools import cache
 from importlib.metadata import entry_points
@@ -270,6 +271,9 @@ def _add_commands() -> int:
 def main(arguments: list[str] | None = None) -> int:
     """Run one command line and return its exit code."""
     arguments = arguments or sys.argv[1:] or ["--help"]
+    for stream in (sys.stdout, sys.stderr):  # of a locale, or a file's name, that lacks a character of a line
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     with new_policy() as asked:
         try:
             code = _run(arguments)

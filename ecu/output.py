@@ -7,6 +7,7 @@
 import json
 import math
 import os
+import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
@@ -109,6 +110,12 @@ def wrote(*paths: Path, next: str = "") -> None:
     """Say which files a command wrote, and the command that goes on with them."""
     say(f"written: {', '.join(map(str, paths))}{f'; next: {next}' if next else ''}")
     give(written=list(paths), **({"next": next} if next else {}))
+
+
+def argument(path: Path | str) -> str:
+    """Return a path as a shell takes it: quoted where it has to be, and no option."""
+    text = str(path)
+    return shlex.quote(f"./{text}" if text.startswith("-") else text)
 
 
 def print_given() -> None:

@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 from pydantic import ValidationError
 
 from ecu.errors import UserError
-from ecu.output import fault, give
+from ecu.output import argument, fault, give
 from ecu.settings import data_sheet as sheet
 from ecu.settings.check import figures
 from ecu.settings.config import Config, load_config, new_params, violations
@@ -294,9 +294,10 @@ def _tell(out: Path, config: Config) -> int:
     for line in figures(config, params):
         print(line)
     print(f'{out}: written; lines that end in "{ASSUMED}" are another car\'s')
-    print(f"next: brake-ecu config check {out}")
-    give(written=[out], next=f"brake-ecu config check {out}")
-    print(f"      brake-ecu identify vehicle DRIVE… --config {out} --out {out.stem}-identified.toml")
+    print(f"next: brake-ecu config check {argument(out)}")
+    give(written=[out], next=f"brake-ecu config check {argument(out)}")
+    identified = argument(f"{out.stem}-identified.toml")
+    print(f"      brake-ecu identify vehicle DRIVE… --config {argument(out)} --out {identified}")
     for finding in found:
         fault(f"brake-ecu: {finding}")
     return 1 if found else 0

@@ -9,6 +9,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 from ecu.errors import UserError
+from ecu.output import argument
 from ecu.recording.calibration import add_note, in_force
 from ecu.recording.recorder import start_recording, write_batch
 from ecu.recording.ring import Batch, RingReader
@@ -68,6 +69,5 @@ def keep_now(watcher: Watcher, folder: Path, lock: AbstractContextManager[object
     except UserError as error:
         return str(error)
     kept_s = sum(len(batch.records) for batch in batches) / 100
-    return (
-        f"{kept_s:.0f} s kept in {kept}; next: brake-ecu replay {kept} --config CONFIG --out RESULT.parquet"
-    )
+    again = f"brake-ecu replay {argument(kept)} --config CONFIG --out RESULT.parquet"
+    return f"{kept_s:.0f} s kept in {kept}; next: {again}"

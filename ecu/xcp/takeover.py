@@ -13,6 +13,7 @@ import structlog
 
 from ecu.contract.records import RecordArray, new_record
 from ecu.errors import UserError
+from ecu.output import argument
 from ecu.recording.calibration import in_force
 from ecu.recording.ring import RingReader
 from ecu.runtime.asking import Busy, Sleep, taken_over
@@ -88,7 +89,9 @@ class Takeover:
         except OSError as error:
             reason = f"{self._save}: cannot be written: {error.strerror}"
             raise self._refused(Error.GENERIC, reason) from None
-        self._log.info("calibration_saved", file=str(self._save), next=f"brake-ecu config check {self._save}")
+        self._log.info(
+            "calibration_saved", file=str(self._save), next=f"brake-ecu config check {argument(self._save)}"
+        )
 
     def _refused(self, error: Error, reason: str) -> Refused:
         self._log.warning("calibration_refused", reason=reason)

@@ -1,6 +1,10 @@
 """One policy for what commands print: what stands on standard output and what on standard error."""
 
 import json
+import os
+import shlex
+import subprocess
+import sys
 import threading
 from pathlib import Path
 from typing import NamedTuple
@@ -14,6 +18,7 @@ from ecu.output import (
     LOG_FORMAT,
     LOG_LEVEL,
     Level,
+    argument,
     asked,
     detail,
     fault,
@@ -143,3 +148,22 @@ def test_a_thread_says_details_by_the_same_policy(capsys: pytest.CaptureFixture[
         thread.start()
         thread.join()
     assert capsys.readouterr().err == "compiling\n"
+
+
+@pytest.mark.parametrize(
+    ("path", "word"),
+    [("out/a.log", "out/a.log"), ("a b.log", "'a b.log'"), ("-a.log", "./-a.log"), ("it's", "'it'\"'\"'s'")],
+)
+def test_a_next_command_can_be_pasted(path: str, word: str) -> None:
+    assert argument(Path(path)) == word
+    assert shlex.split(word) == [path if path[0] != "-" else f"./{path}"]
+
+
+def test_what_a_terminal_has_no_character_for_is_a_question_mark() -> None:
+    said = subprocess.run(
+        [sys.executable, "-m", "ecu.cli", "config", "check", b"f\xe4hrt \xe2\x82\xac.toml"],
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+    )
+    assert said.returncode == 2
+    assert said.stderr.startswith(b"brake-ecu: f?hrt ?.toml: ")

@@ -32,7 +32,7 @@ from ecu.bus.database import read_database
 from ecu.bus.signal_map import SLOWEST_S, load_signal_map
 from ecu.contract.signals import INPUT, INPUT_SIGNALS, without_corner
 from ecu.errors import UserError
-from ecu.output import give, say
+from ecu.output import argument, give, say
 from ecu.settings.config import load_config, new_params
 
 WANTED: Final = (
@@ -149,7 +149,7 @@ def _give(log: Path, text: str, out: Path | None) -> None:
         print(text)
         return
     write_text(out, text)
-    following = f"brake-ecu map check {log} --map {out}"
+    following = f"brake-ecu map check {argument(log)} --map {argument(out)}"
     give(written=[out], next=following)
     for line in (f"written: {out}; check and edit it", f"next: {following}"):
         say(line)

@@ -43,7 +43,7 @@ from ecu.algorithm.step import new_state
 from ecu.bus.receive_plan import ReceivePlan
 from ecu.contract.records import RecordArray
 from ecu.errors import RunFault, UserError
-from ecu.output import Level, detail, give, policy, say, wrote
+from ecu.output import Level, argument, detail, give, policy, say, wrote
 from ecu.recording.recorder import Recording, read_recording
 from ecu.recording.rest import cool_discs
 from ecu.recording.restored import restored
@@ -76,7 +76,8 @@ def replay(
     if out.suffix in EXPORTS:
         wrote(out)
     else:
-        wrote(out, brakes_path(out), next=f"brake-ecu report {out} --out {out.with_suffix('.html')}")
+        page = argument(out.with_suffix(".html"))
+        wrote(out, brakes_path(out), next=f"brake-ecu report {argument(out)} --out {page}")
     if nothing_usable(done.findings):
         names = ", ".join(group.name for group in NEEDED)
         raise RunFault(f"{out}: not one sample of the needed inputs was usable ({names})")

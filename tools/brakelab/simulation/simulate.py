@@ -18,7 +18,7 @@ from brakelab.simulation.scenario import Scenario, load_scenario
 from brakelab.simulation.scenario_car import other_car, with_draw, with_plant_for
 from brakelab.simulation.vehicle_bus import TRUTH_COLUMNS
 from ecu.contract.signals import CYCLE_NS, INPUT_SIGNALS, N_OUTPUTS
-from ecu.output import give, say, wrote
+from ecu.output import argument, give, say, wrote
 from ecu.settings.config import Config, load_config
 from ecu.settings.resources import command_name
 
@@ -109,6 +109,7 @@ def simulate(
                 write_columns(path, t, dict(zip(names, np.concatenate(blocks).T, strict=True)), metadata)
     if printed:
         give(seconds=float(t[-1]), frames=frames)
-        again = f"brake-ecu replay {log} --config {command_name(config)} --out {out}.result.parquet"
+        car, result = argument(command_name(config)), argument(f"{out}.result.parquet")
+        again = f"brake-ecu replay {argument(log)} --config {car} --out {result}"
         wrote(log, inputs, truth, next=again)
     return Simulated(driven, vehicle, t, np.concatenate(outputs), np.concatenate(true), truth)

@@ -12,7 +12,7 @@ from brakelab.identify.dust.reader import read_trips
 from brakelab.identify.measurement_files import open_campaign
 from ecu.contract.dust import MODELS
 from ecu.errors import RunFault
-from ecu.output import give, wrote
+from ecu.output import argument, give, wrote
 
 LOST: Final = 1.0
 """Relative error of the particles of trips left out, from which on a model predicts nothing."""
@@ -77,4 +77,4 @@ def identify_dust(manifest: Path, config: Path, axle: str, out: Path, columns: P
     )
     print(f"{page}: models beside each other, background, correlations")
     give(model=chosen.name, left_out=chosen.left_out_sum, trips=len(trained))
-    wrote(*written, next=f"brake-ecu replay LOG --config {out} --out drive.parquet")
+    wrote(*written, next=f"brake-ecu replay LOG --config {argument(out)} --out drive.parquet")

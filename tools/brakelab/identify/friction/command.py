@@ -35,7 +35,7 @@ from brakelab.results.outputs import check_outputs, write_text
 from brakelab.results.progress import progress_bar
 from brakelab.results.text_table import show
 from ecu.errors import UserError
-from ecu.output import give, say, wrote
+from ecu.output import argument, give, say, wrote
 from ecu.settings.resources import named, resource
 
 FEWEST_STOPS: Final = 10
@@ -79,11 +79,11 @@ def run(
     hours, minutes = bench.time / 3600.0, recording.time.size / 200.0 / 60.0
     say(f"{hours:.1f} h on the rig, {minutes:.0f} min recorded")
     give(hours=hours, minutes_recorded=minutes)
-    lining_file = out.with_name(f"{out.stem}-lining.toml")
+    data, lining_file = argument(out), argument(out.with_name(f"{out.stem}-lining.toml"))
     wrote(
         out,
         beside,
-        next=f"brake-ecu lab report {out}; brake-ecu identify friction {out} --out {lining_file}",
+        next=f"brake-ecu lab report {data}; brake-ecu identify friction {data} --out {lining_file}",
     )
 
 

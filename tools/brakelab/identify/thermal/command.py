@@ -15,7 +15,7 @@ from brakelab.identify.thermal.result import errors_of, judge, section_of, start
 from brakelab.results.outputs import check_outputs, config_files
 from brakelab.simulation.configured import with_keys
 from ecu.errors import UserError
-from ecu.output import give, wrote
+from ecu.output import argument, give, wrote
 from ecu.settings.config import Axle, Config, load_config
 
 AXLES: Final = {"front": (0, 1), "rear": (2, 3)}
@@ -103,4 +103,4 @@ def identify_thermal(logs: Sequence[Path], config: Path, map: Path | None, out: 
             f"{axle.name}: ξ {fit.heating:.3g} K/J, δ {fit.cooling.still:.3g} + {fit.cooling.by_speed:.3g} v "
             f"1/s; {_about(axle)}, inside 2σ {inside:.0f} %"
         )
-    wrote(*written, next=f"brake-ecu replay LOG --config {out} --out drive.parquet")
+    wrote(*written, next=f"brake-ecu replay LOG --config {argument(out)} --out drive.parquet")

@@ -11,7 +11,7 @@ from brakelab.identify.vehicle.reader import read_drives
 from brakelab.identify.vehicle.solve import identify
 from brakelab.results.outputs import check_outputs, config_files
 from ecu.errors import UserError
-from ecu.output import give, say, wrote
+from ecu.output import argument, give, say, wrote
 from ecu.settings.config import load_config, new_params
 
 
@@ -56,6 +56,6 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
             f"{name}: reads {zero:+.4g} at 0"
             + ("" if map else f"; a map would take it off: offset = {-zero:.4g}")
         )
-    with_map = f" --map {own_map if zeros else map}" if map else ""
-    replay = f"brake-ecu replay {drives[0]} --config {out}{with_map} --out drive.parquet"
+    with_map = f" --map {argument(own_map if zeros else map)}" if map else ""
+    replay = f"brake-ecu replay {argument(drives[0])} --config {argument(out)}{with_map} --out drive.parquet"
     wrote(*(written if map and zeros else written[:3]), next=replay)

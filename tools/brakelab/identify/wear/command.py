@@ -24,7 +24,7 @@ from brakelab.identify.wear.page import tables, write_page
 from brakelab.identify.wear.reader import Block, read_blocks
 from brakelab.identify.wear.weighings import SIDES
 from ecu.errors import RunFault, UserError
-from ecu.output import give, say, wrote
+from ecu.output import argument, give, say, wrote
 from ecu.settings.config import Axle
 from ecu.settings.pad import Pad
 
@@ -169,4 +169,4 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path, columns: P
         f"{page}: {len(blocks)} blocks, R² {fit.r2:.4f} (quasi-static {static.r2:.4f}), blocks left out "
         f"{100 * leave_one_out(fit, fused.mass):.1f} % RMS, rank {fit.rank} of 7"
     )
-    wrote(*written, next=f"brake-ecu replay LOG --config {out} --out drive.parquet")
+    wrote(*written, next=f"brake-ecu replay LOG --config {argument(out)} --out drive.parquet")

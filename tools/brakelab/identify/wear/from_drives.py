@@ -21,7 +21,7 @@ from brakelab.results.files import brakes_path
 from brakelab.results.outputs import check_outputs, config_files, write_text
 from brakelab.results.text_table import markdown
 from ecu.errors import UserError
-from ecu.output import give, wrote
+from ecu.output import argument, give, wrote
 from ecu.settings.config import load_config, new_params
 
 COUNT: Final = 300
@@ -72,4 +72,5 @@ def blocks_from_drives(drives: list[Path], config: Path, axle: str, out: Path) -
     print(f"{page}: how they stand for the drives; a flywheel for {mass:.0f} kg, {inertia:.1f} kg m²")
     give(blocks=[block.name for block in blocks], mass=mass, applications=len(road.energy), left_out=left_out)
     first = programmes[0]
-    wrote(*written, next=f"brake-ecu lab run {first} --out {first.with_name(f'{first.stem}-run.csv')}")
+    recording = first.with_name(f"{first.stem}-run.csv")
+    wrote(*written, next=f"brake-ecu lab run {argument(first)} --out {argument(recording)}")
