@@ -1,5 +1,7 @@
 """Columns as pandas, Polars and Arrow: the same values, missing ones as each of them says it."""
 
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -128,3 +130,55 @@ def test_rows_by_a_mask() -> None:
     some = TABLE.where(TABLE["t"] > 0.005)
     assert (len(some), some.units) == (2, TABLE.units)
     assert some["law"].tolist() == ["", "table"]
+
+
+def curves(svg: str) -> list[list[list[float]]]:
+    lines = re.findall(r'<polyline points="([^"]*)"', svg)
+    return [[[float(each) for each in point.split(",")] for point in line.split()] for line in lines]
+
+
+def test_a_plot_has_a_panel_for_each_name_and_a_line_for_each_wheel() -> None:
+    n = 5
+    table = Table(
+        {
+            "t": np.arange(n) * 0.01,
+            "speed": np.array([3.0, np.nan, 1.0, 2.0, 5.0]),
+            **{f"mu_b_{corner}": np.full(n, k) for k, corner in enumerate(("fl", "fr", "rl", "rr"))},
+        },
+        {"t": "s", "speed": "m/s"},
+    )
+    drawn = table.plot("speed", "mu_b")
+    found = curves(drawn.svg)
+    assert [len(line) for line in found] == [4, 5, 5, 5, 5], "a value that is not known is left out"
+    assert found[0][0][1] > found[0][-1][1], "y grows upwards"
+    heights = [line[0][1] for line in found[1:]]
+    assert heights == sorted(heights, reverse=True)
+    for text in ("speed [m/s]", ">mu_b<", ">t [s]<", ">rl<"):
+        assert text in drawn.svg
+    assert drawn._repr_html_() == f'<div style="max-width:880px">{drawn.svg}</div>'
+    assert ">rl<" not in table.plot("speed", x="mu_b_fl").svg
+
+
+@pytest.mark.parametrize("name", ["pressure", "number", "valid", "t"])
+@pytest.mark.parametrize("table", [TABLE, EMPTY, TABLE.where(np.array([True, False, False]))])
+def test_whatever_is_known_is_drawn(table: Table, name: str) -> None:
+    assert "nan" not in table.plot(name).svg
+
+
+@pytest.mark.parametrize(
+    ("names", "x", "says"),
+    [
+        ((), "t", 'plot: name what to draw: plot("mu_b", "vehicle_speed")'),
+        (("presure",), "t", "column: presure: no such column; did you mean pressure?"),
+        (("law",), "t", "plot: law: has text; name a column of numbers"),
+        (("pressure",), "time", "column: time: no such column"),
+    ],
+)
+def test_a_plot_of_what_is_none_says_so(names: tuple[str, ...], x: str, says: str) -> None:
+    with pytest.raises(UserError, match=re.escape(says)):
+        TABLE.plot(*names, x=x)
+
+
+def test_a_plot_is_saved(tmp_path: Path) -> None:
+    drawn = TABLE.plot("pressure")
+    assert drawn.save(tmp_path / "new" / "drive.svg").read_text("utf-8") == drawn.svg

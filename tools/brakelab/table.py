@@ -3,17 +3,39 @@
 from collections.abc import Iterator, Mapping
 from html import escape
 from importlib import import_module
+from os import PathLike
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.results.chart import BLUE, GREEN, ORANGE, PINK, Line, Panel, chart_svg
+from brakelab.results.outputs import write_text
 from ecu.contract.signals import CORNERS, OUTPUT_SIGNALS, column_names
 from ecu.errors import UserError, closest
 
 SHOWN: Final = 8
 """Columns that a table names of itself."""
+_COLOURS: Final = tuple(zip(CORNERS, (BLUE, ORANGE, GREEN, PINK), strict=True))
+_PANEL_PX: Final = 440
 _FOUR: Final = {signal.name: column_names(signal) for signal in OUTPUT_SIGNALS if signal.corners}
+
+
+class Picture:
+    """Curves, which a notebook shows."""
+
+    def __init__(self, svg: str, columns: int) -> None:
+        self.svg = svg
+        self._width = columns * _PANEL_PX
+
+    def _repr_html_(self) -> str:
+        return f'<div style="max-width:{self._width}px">{self.svg}</div>'
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write it as SVG and return the path. Raises UserError if it cannot be written."""
+        write_text(Path(path), self.svg)
+        return Path(path)
 
 
 class Table:
@@ -43,6 +65,36 @@ class Table:
     def unit(self, name: str) -> str:
         """Return the unit of a column or of four, empty: none. Raises UserError for a name that is none."""
         return self.units.get(name if name in self.columns else self._four(name)[0], "")
+
+    def plot(self, *names: str, x: str = "t", columns: int = 2) -> Picture:
+        """Return a panel for each name over the column `x`, by a name without its corner the four wheels.
+
+        `columns`: panels in a row. Raises UserError for a name that is none, or has text.
+        """
+        if not names:
+            raise UserError("plot", "", 'name what to draw: plot("mu_b", "vehicle_speed")')
+        along = self._number(x)
+        panels, wheels = [], False
+        for name in names:
+            curves = [(name, BLUE)] if name in self.columns else []
+            if not curves:
+                curves = [(one, of) for one, (_, of) in zip(self._four(name), _COLOURS, strict=True)]
+                wheels = True
+            lines = [Line(along, self._number(one), colour) for one, colour in curves]
+            ends = _ends(np.concatenate([line.y for line in lines]), 0.05)
+            panels.append(Panel(self._with_unit(name), self._with_unit(x), _ends(along, 0.0), ends, lines))
+        across = min(columns, len(panels))
+        return Picture(chart_svg(panels, _COLOURS if wheels else (), across), across)
+
+    def _number(self, name: str) -> NDArray[np.float64]:
+        column = self.column(name)
+        if column.dtype == object:
+            raise UserError("plot", name, "has text; name a column of numbers")
+        return column.astype(np.float64)
+
+    def _with_unit(self, name: str) -> str:
+        unit = self.unit(name)
+        return f"{name} [{unit}]" if unit else name
 
     def _four(self, name: str) -> tuple[str, ...]:
         columns = _FOUR.get(name, tuple(f"{name}_{corner}" for corner in CORNERS))
@@ -122,6 +174,14 @@ class Listing(Table):
         rows = zip(*(column.tolist() for column in self.columns.values()), strict=True)
         shown = [[f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row] for row in rows]
         return _html(self, [*self.columns], shown)
+
+
+def _ends(values: NDArray[np.float64], margin: float) -> tuple[float, float]:
+    """Return the ends of an axis, beyond the values by a `margin` of what they span."""
+    known = values[np.isfinite(values)]
+    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+    beyond = margin * (high - low) if high > low else 0.5 * max(abs(low), 1.0)
+    return low - beyond, high + beyond
 
 
 def _html(table: Table, head: list[str], rows: list[list[str]]) -> str:
