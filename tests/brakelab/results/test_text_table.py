@@ -3,8 +3,9 @@
 import math
 
 import pytest
+from rich.console import Console
 
-from brakelab.results.text_table import Table, cell, markdown
+from brakelab.results.text_table import Table, cell, markdown, show
 
 
 def test_a_bar_in_a_cell_is_no_new_cell() -> None:
@@ -18,3 +19,10 @@ def test_a_bar_in_a_cell_is_no_new_cell() -> None:
 )
 def test_what_is_not_known_is_a_dash(value: float, digits: str, shown: str) -> None:
     assert cell(value, digits) == shown
+
+
+def test_nothing_is_cut_on_a_narrow_terminal() -> None:
+    console = Console(width=40)
+    with console.capture() as capture:
+        show(console, Table("Terms", ("configuration", "measurement", "uncertainty"), [("0", "1", "2")], ""))
+    assert "…" not in capture.get()

@@ -28,9 +28,9 @@ def brakings_table(rows: Sequence[BrakeRow], nominal: Sequence[float]) -> Table:
     """
     table = Table(box=SIMPLE)
     for name in ("start s", "lasts s", "km/h", "m/s²", "predicted", "configured"):
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", overflow="fold")
     for name in ("mu_b front, then", "mu_b rear, then", "not learned"):
-        table.add_column(name)
+        table.add_column(name, overflow="fold")
     for first in range(0, len(rows), len(CORNERS)):
         corners = rows[first : first + len(CORNERS)]
         one = corners[0]
@@ -86,12 +86,15 @@ def prediction_lines(rows: Sequence[BrakeRow]) -> list[str]:
     lines = ["prediction: no braking to judge it by"]
     if counted:
         found = errors_of(counted)
+        spread = (
+            f" on the mean, {100 * found.median:.1f} % in the median, {100 * found.worst:.1f} % at worst"
+            if found.counted > 1
+            else ""
+        )
         lines = [
             f"prediction of {found.counted} braking{'s' if found.counted > 1 else ''}: "
-            f"off by {100 * found.mean:.1f} % on the mean, "
-            f"{100 * found.median:.1f} % in the median, {100 * found.worst:.1f} % at worst, "
-            f"bias {100 * found.bias:+.1f} %",
-            "beside it, on the mean: " + ", ".join(
+            f"off by {100 * found.mean:.1f} %{spread}, bias {100 * found.bias:+.1f} %",
+            f"beside it{', on the mean' if found.counted > 1 else ''}: " + ", ".join(
                 f"{name} {100 * errors(measured, other).mean:.1f} %" for name, other in peers(counted).items()
             ),
         ]  # fmt: skip

@@ -29,7 +29,8 @@ def show(console: Console, table: Table) -> None:
     give_table(table)
     printed = RichTable(title=table.title, caption=table.below, title_justify="left", caption_justify="left")
     for place, column in enumerate(table.columns):
-        printed.add_column(column, justify="left" if place == 0 or column == "note" else "right")
+        left = place == 0 or column == "note"
+        printed.add_column(column, justify="left" if left else "right", overflow="fold")
     for row in table.rows:
         printed.add_row(*row)
     console.print(printed)
