@@ -1,6 +1,7 @@
 """No command writes over what it reads, by whatever name; TOML is written to names that end in .toml."""
 
 import errno
+import os
 import re
 import shutil
 from pathlib import Path
@@ -144,3 +145,25 @@ def test_an_output_that_is_a_link_stays_one(tmp_path: Path) -> None:
     write_text(tmp_path / "link.html", "text")
     assert (tmp_path / "link.html").is_symlink()
     assert (tmp_path / "page.html").read_text() == "text"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "rig single --config suv --lock-step --junit {}",
+        "replay drive.csv --config suv --out {}.parquet",
+        "simulate single --config suv --out {}",
+        "map suggest drive.csv --config suv --out {}.toml",
+    ],
+)
+@pytest.mark.parametrize(
+    ("place", "says"), [("/proc/page", "Permission denied"), ("/dev/null/page", "Not a directory")]
+)
+def test_what_cannot_be_written_is_known_before_the_work(
+    command: str, place: str, says: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda path, mode: not str(path).startswith("/proc"))  # root may all
+    assert cli.main(command.format(place).split()) == 2
+    line = capsys.readouterr().err
+    assert line.startswith(f"brake-ecu: {place}")
+    assert f"cannot be written ({says}); choose another --" in line
