@@ -153,6 +153,7 @@ def test_a_plot_has_a_panel_for_each_name_and_a_line_for_each_wheel() -> None:
     assert found[0][0][1] > found[0][-1][1], "y grows upwards"
     heights = [line[0][1] for line in found[1:]]
     assert heights == sorted(heights, reverse=True)
+    assert len(curves(table.plot("speed", "mu_b", columns=0).svg)) == 5
     for text in ("speed [m/s]", ">mu_b<", ">t [s]<", ">rl<"):
         assert text in drawn.svg
     assert drawn._repr_html_() == f'<div style="max-width:880px">{drawn.svg}</div>'
@@ -172,11 +173,22 @@ def test_whatever_is_known_is_drawn(table: Table, name: str) -> None:
         (("presure",), "t", "column: presure: no such column; did you mean pressure?"),
         (("law",), "t", "plot: law: has text; name a column of numbers"),
         (("pressure",), "time", "column: time: no such column"),
+        ((["pressure"],), "t", "column: ['pressure']: no such column"),
     ],
 )
 def test_a_plot_of_what_is_none_says_so(names: tuple[str, ...], x: str, says: str) -> None:
     with pytest.raises(UserError, match=re.escape(says)):
         TABLE.plot(*names, x=x)
+
+
+def test_brake_applications_are_drawn_over_their_start() -> None:
+    brakings = Table({"brake": np.arange(3), "t_start": np.array([1.0, 5.0, 9.0]), "v_in": np.ones(3)}, {})
+    assert ">t_start<" in brakings.plot("v_in").svg
+
+
+def test_a_place_is_no_name() -> None:
+    with pytest.raises(UserError, match="column: 0: no such column"):
+        TABLE[0]
 
 
 def test_a_plot_is_saved(tmp_path: Path) -> None:

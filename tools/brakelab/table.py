@@ -52,9 +52,10 @@ class Table:
 
         Raises UserError for a name that is none.
         """
-        if name in self.columns:
-            return self.columns[name]
-        return np.stack([self.columns[one] for one in self._four(name)], axis=1)
+        names = self._named(name)
+        return (
+            np.stack([self.columns[one] for one in names], axis=1) if len(names) > 1 else self.columns[name]
+        )
 
     def column(self, name: str) -> NDArray[Any]:
         """Return a single column. Raises UserError for a name that is none."""
@@ -64,26 +65,29 @@ class Table:
 
     def unit(self, name: str) -> str:
         """Return the unit of a column or of four, empty: none. Raises UserError for a name that is none."""
-        return self.units.get(name if name in self.columns else self._four(name)[0], "")
+        return self.units.get(self._named(name)[0], "")
 
-    def plot(self, *names: str, x: str = "t", columns: int = 2) -> Picture:
+    def plot(self, *names: str, x: str | None = None, columns: int = 2) -> Picture:
         """Return a panel for each name over the column `x`, by a name without its corner the four wheels.
 
-        `columns`: panels in a row. Raises UserError for a name that is none, or has text.
+        `x`: None: `t`, of brake applications `t_start`. `columns`: panels in a row. Raises UserError for a
+        name that is none, or has text.
         """
         if not names:
             raise UserError("plot", "", 'name what to draw: plot("mu_b", "vehicle_speed")')
+        x = x or ("t_start" if "t_start" in self.columns else "t")
         along = self._number(x)
         panels, wheels = [], False
         for name in names:
-            curves = [(name, BLUE)] if name in self.columns else []
-            if not curves:
-                curves = [(one, of) for one, (_, of) in zip(self._four(name), _COLOURS, strict=True)]
-                wheels = True
-            lines = [Line(along, self._number(one), colour) for one, colour in curves]
+            curves = self._named(name)
+            wheels |= len(curves) > 1
+            lines = [
+                Line(along, self._number(one), colour)
+                for one, (_, colour) in zip(curves, _COLOURS, strict=False)
+            ]
             ends = _ends(np.concatenate([line.y for line in lines]), 0.05)
             panels.append(Panel(self._with_unit(name), self._with_unit(x), _ends(along, 0.0), ends, lines))
-        across = min(columns, len(panels))
+        across = min(max(columns, 1), len(panels))
         return Picture(chart_svg(panels, _COLOURS if wheels else (), across), across)
 
     def _number(self, name: str) -> NDArray[np.float64]:
@@ -96,14 +100,19 @@ class Table:
         unit = self.unit(name)
         return f"{name} [{unit}]" if unit else name
 
-    def _four(self, name: str) -> tuple[str, ...]:
+    def _named(self, name: str) -> tuple[str, ...]:
+        """Return the column of this name, or the four."""
+        if not isinstance(name, str):
+            raise self._none(name)
+        if name in self.columns:
+            return (name,)
         columns = _FOUR.get(name, tuple(f"{name}_{corner}" for corner in CORNERS))
         if not all(column in self.columns for column in columns):
             raise self._none(name)
         return columns
 
     def _none(self, name: str) -> UserError:
-        remedy = f"no such column{closest(name, self.columns)}; `.columns` has all {len(self.columns)}"
+        remedy = f"no such column{closest(str(name), self.columns)}; `.columns` has all {len(self.columns)}"
         return UserError("column", str(name), remedy)
 
     def __repr__(self) -> str:
