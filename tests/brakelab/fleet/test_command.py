@@ -64,7 +64,10 @@ def test_of_a_fleet_without_one_good_drive_each_reason_is_said(
     assert printed.err.count("failed: ") == 2
     assert "0 of 2 drives of 2 vehicles" in printed.out
     assert "; 0 replayed now, 2 failed," in printed.out
-    assert "Drives that failed" in (tmp_path / "out" / "report.html").read_text("utf-8")
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "Drives that failed" in page
+    assert '<td class="text sentence">line 1: no candump log' in page
+    assert "No five vehicles have the same configuration: none is compared." in page
 
 
 @pytest.mark.study

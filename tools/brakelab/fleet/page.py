@@ -1,5 +1,6 @@
 """Fleet page: outliers, spread of friction, prediction and energy, failed drives."""
 
+from collections import Counter
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -12,6 +13,7 @@ from bokeh.models import ColumnDataSource, HoverTool
 from brakelab.fleet.lines import FEW, lines_of_vehicles
 from brakelab.fleet.output import page_file
 from brakelab.fleet.statistics import (
+    LEAST_VEHICLES,
     QUANTITIES,
     Note,
     Quantity,
@@ -61,6 +63,7 @@ def write_page(done: Sequence[Summary], out: Path) -> None:
             "euro_7": euro7.WORDS,
             "due_left": max(len(due) - ROWS, 0),
             "outliers": outliers(vehicles)[:ROWS],
+            "compared": max(Counter(vehicles.groups).values(), default=0) >= LEAST_VEHICLES,
             "failed": [
                 Note(row["vehicle"], row["drive"], lines_of(row, "fault")) for row in done if row["fault"]
             ],
