@@ -145,6 +145,11 @@ def test_a_result_that_cannot_be_read_gives_one_line(tmp_path: Path, content: st
     assert str(error.value).startswith(str(path))
 
 
+def test_a_folder_is_no_result(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="is a folder: give a result"):
+        read_result(tmp_path)
+
+
 def test_mdf4_holds_the_same_numbers_units_and_provenance(tmp_path: Path, params: RecordArray) -> None:
     asammdf = pytest.importorskip("asammdf")
     values = rows(100)

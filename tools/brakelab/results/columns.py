@@ -80,7 +80,7 @@ def open_columns(path: Path, remedy: str, required: Iterable[str] = ()) -> Store
     if path.suffix in EXPORTS:
         raise UserError(str(path), "", "results are read from Parquet; `replay` with --out RESULT.parquet")
     if not path.is_file():
-        raise UserError(str(path), "no such file", remedy)
+        raise UserError(str(path), "is a folder" if path.is_dir() else "no such file", remedy)
     with _readable(path, remedy):
         file = pq.ParquetFile(path)
 
