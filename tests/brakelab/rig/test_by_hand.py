@@ -1,14 +1,19 @@
 """Faults by hand: lines typed while the simulated car drives."""
 
-from collections.abc import Iterator
+import io
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from threading import Event
 
 import numpy as np
 import pytest
 
+from brakelab.rig import vehicle_node
 from brakelab.rig.by_hand import ROOM, Hand, typed, with_room
 from brakelab.rig.vehicle_node import drive_in_real_time, new_node
 from brakelab.simulation.vehicle_bus import Vehicle
+from ecu import cli
 from ecu.errors import UserError
 
 from .test_vehicle_node import FakeBus, FakeClock, column, scenario
@@ -91,3 +96,31 @@ def test_frames_are_lost_from_the_cycle_in_which_it_is_typed() -> None:
     assert without["Imu"] == [*range(first, first + 20)]
     assert without["Steering"] == [*range(70, 100)]
     assert column(truth.values, "fault_acting")[-1] == 2
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_the_command_takes_them_from_standard_input_if_it_is_asked_to(
+    asked: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class ReadAtOnce(Hand):
+        def __init__(self, vehicle: Vehicle, lines: Iterable[str]) -> None:
+            super().__init__(vehicle, lines)
+            self._reader.join()
+
+    clock = FakeClock()
+    short = tmp_path / "short.toml"
+    short.write_text('plant = "suv"\ninitial_speed = 20.0\n[[phase]]\nkind = "coast"\nseconds = 0.1\n')
+    monkeypatch.setattr(sys, "stdin", io.StringIO("lost message=Imu\n\noff\n"))
+    for name, stand_in in (
+        ("Hand", ReadAtOnce),
+        ("open_channel", lambda *bus, receive_ids: FakeBus(clock)),
+        ("system_time", clock.source),
+        ("ask_for_priority", lambda: None),
+        ("warm_up", lambda driven: None),
+    ):
+        monkeypatch.setattr(vehicle_node, name, stand_in)
+    monkeypatch.setattr("signal.signal", lambda number, handler: None)
+    words = ["vehicle", str(short), "-i", "virtual", "-c", "x", "--alone"]
+    assert cli.main([*words, *(["--by-hand"] if asked else [])]) == 0
+    taken = ["0.00 s: lost message=Imu", "0.00 s: off"] if asked else []
+    assert capsys.readouterr().out.splitlines()[2:] == taken
