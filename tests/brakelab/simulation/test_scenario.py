@@ -8,6 +8,7 @@ import pytest
 from brakelab.plant.records import BRAKE, CRUISE
 from brakelab.simulation.scenario import load_scenario
 from brakelab.simulation.scenario_car import scenario_plant
+from ecu import cli
 from ecu.errors import UserError
 
 CONFIG = Path(__file__).parents[3] / "config" / "scenarios"
@@ -66,6 +67,15 @@ def test_a_road_may_be_described_by_place(tmp_path: Path) -> None:
     assert np.array_equal(road.friction, [[0.0, 1.2, 0.2]])
     assert np.array_equal(road.bank, [[0.0, 0.0], [90.0, 0.05]])
     assert (len(road.height), len(road.grade)) == (0, 0)
+
+
+def test_every_mistake_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text('name = "mine"\n[[phase]]\nkind = "coast"\nseconds = -1.0\n')
+    assert cli.main(["vehicle", str(path), "-i", "virtual", "-c", "x"]) == 2
+    said = [line.removeprefix(f"brake-ecu: {path}: ") for line in capsys.readouterr().err.splitlines()]
+    places = [line.partition(": ")[0] for line in said]
+    assert sorted(places) == ["initial_speed", "name", "phase.0.seconds", "plant"]
 
 
 @pytest.mark.parametrize(

@@ -105,7 +105,8 @@ from brakelab.simulation.scenario_tables import (
     as_rows,
 )
 from brakelab.simulation.speed_trace import SpeedTrace
-from ecu.settings.toml_file import Unit, describe, read_toml
+from ecu.errors import Mistakes
+from ecu.settings.toml_file import Unit, findings, read_toml
 
 __all__ = [
     "LONGEST_DRIVE",
@@ -257,7 +258,7 @@ def load_scenario(path: Path) -> Scenario:
     """Read and check a scenario file.
 
     Raises:
-        UserError: the file cannot be read, or a key is missing, unknown or out of range.
+        UserError: the file cannot be read, or keys are missing, unknown or out of range: all of them.
     """
     content = read_toml(path)
     trace = content.get("trace")
@@ -269,4 +270,5 @@ def load_scenario(path: Path) -> Scenario:
     try:
         return Scenario.model_validate(content)
     except ValidationError as error:
-        raise describe(error, str(path), Scenario) from None
+        found = findings(error, lambda _: str(path), Scenario)
+        raise Mistakes(str(path), [(one.place, one.remedy) for one in found]) from None
