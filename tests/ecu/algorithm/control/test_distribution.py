@@ -143,18 +143,21 @@ def test_what_the_trailing_axle_is_not_left_the_leading_one_takes(
     assert np.sum(after[leading] / p["wheel_radius"][leading]) < GRIP * (at_rest + shift)
 
 
-def test_beyond_the_grip_of_most_roads_the_leading_axle_takes_it_slowly(params, state) -> None:
-    """At 7 m/s^2 the front at once takes what is 0.6 of its load, then 0.5 of it a second more."""
-    p = params[0]
-    load = p["mass"] * (G * p["rear_axle"] + 7.0 * p["cog_height"]) / p["wheelbase"]
-    distribute(p, state[0], p["mass"], 7.0, False, DT)
-    alone = np.sum(state[0]["torque"][:2] / p["wheel_radius"][:2])
+@pytest.mark.parametrize(("backwards", "arm"), [(False, "rear_axle"), (True, "front_axle")])
+def test_beyond_the_grip_of_most_roads_the_leading_axle_takes_it_slowly(
+    params, state, backwards, arm
+) -> None:
+    """At 7 m/s^2 the leading axle at once takes what is 0.6 of its load, then 0.5 of it a second more."""
+    p, leading = params[0], slice(2, 4) if backwards else slice(0, 2)
+    load = p["mass"] * (G * p[arm] + 7.0 * p["cog_height"]) / p["wheelbase"]
+    distribute(p, state[0], p["mass"], 7.0, backwards, DT)
+    alone = np.sum(state[0]["torque"][leading] / p["wheel_radius"][leading])
     assert alone / load == pytest.approx(7.0 / G)
     state["trailing"] = 0.6
     used = []
     for _ in range(60):
-        distribute(p, state[0], p["mass"], 7.0, False, DT)
-        used.append(np.sum(state[0]["torque"][:2] / p["wheel_radius"][:2]) / load)
+        distribute(p, state[0], p["mass"], 7.0, backwards, DT)
+        used.append(np.sum(state[0]["torque"][leading] / p["wheel_radius"][leading]) / load)
     assert used[0] == pytest.approx(7.0 / G), "never less than its own share"
     assert used[40] == pytest.approx(GRIP + 41 * DT * 0.5)
     assert np.sum(state[0]["torque"] / p["wheel_radius"]) <= p["mass"] * 7.0 * (1 + 1e-12)
@@ -173,7 +176,7 @@ class Watch:
         self.state["free_s"] = learned
 
     def run(
-        self, slip, seconds=0.1, decel=5.0, speed=20.0, noise=0.0, lost=None, reckoned=0.0, accel=None
+        self, slip, seconds=0.1, decel=5.0, speed=20.0, noise=0.0, lost=(), reckoned=0.0, accel=None
     ) -> float:
         """Return what the trailing axle is left after some time with a constant slip [%] of fl, fr, rl, rr.
 
@@ -189,8 +192,8 @@ class Watch:
         for _ in range(round(seconds / DT)):
             omega = abs(speed) * (1 + np.array(slip) / 100) / (np.array(radius) * (1 + self.error))
             inputs = self.feed(wheel_speed=omega + noise * random.standard_normal(4))
-            if lost is not None:
-                inputs[0]["new"][WHEEL_SPEED + lost] = 0
+            for i in lost:
+                inputs[0]["new"][WHEEL_SPEED + i] = 0
             wheels = self.failed, self.guarded
             watch_trailing(p, self.state, inputs[0], self.estimate, *wheels, decel, speed, reckoned, DT)
         return float(self.state["trailing"])
@@ -236,12 +239,9 @@ WATCHED = [
     ("noise at 6 m/s", (-3, -3, -3.4, -3.4), {"noise": 0.1, "speed": 6.0}, (0.97, 1.0)),
     ("too slow for slip", WORSE, {"speed": 4.0}, (1.0, 1.0)),
     ("speed unknown", WORSE, {"speed": math.nan}, (1.0, 1.0)),
-    (
-        "a rear wheel's speed lost: the other side watches",
-        WORSE,
-        {"lost": 2},
-        LEAST_REAR,
-    ),
+    ("a rear wheel's speed lost: the other side watches", WORSE, {"lost": (2,)}, LEAST_REAR),
+    ("both lost: nobody watches", WORSE, {"lost": (2, 3)}, (1.0, 1.0)),
+    ("both front wheels' lost", WORSE, {"lost": (0, 1)}, (1.0, 1.0)),
     ("a front wheel's sensor keeps its value: no slip of a braked wheel", (30, -3, -3, -3), {}, (1.0, 1.0)),
     ("nobody brakes", WORSE, {"decel": 0.0}, (1.0, 1.0)),
     ("request lost", WORSE, {"decel": math.nan}, (1.0, 1.0)),
@@ -259,6 +259,13 @@ def test_a_trailing_axle_that_slips_more_than_the_leading_one_is_taken_back(
 ) -> None:
     left = watch.run(slip, **{"seconds": 0.3} | other)
     assert rear[0] - 1e-9 <= left <= rear[1], case
+
+
+def test_both_sides_slip_by_the_same_measures(watch) -> None:
+    """What is kept of a side is its own: the right one alone is taken back as the left one alone."""
+    left = watch.run((-3, -3, -4.5, -3), seconds=0.15)
+    watch.run(EQUAL, seconds=1.0, decel=0.0)
+    assert watch.run((-3, -3, -3, -4.5), seconds=0.15) == pytest.approx(left)
 
 
 DENIED = [
@@ -316,7 +323,7 @@ def test_what_the_radii_differ_is_learned_while_rolling_freely(params, state, fe
     assert watch.run(BEYOND, seconds=0.5) < 0.6
 
 
-@pytest.mark.parametrize("moving", [{"accel_x": 1.0}, {"yaw_rate": 0.1}])
+@pytest.mark.parametrize("moving", [{"accel_x": 0.6}, {"accel_x": -0.6}, {"yaw_rate": 0.04}])
 def test_nothing_is_learned_while_the_car_does_not_roll_freely(params, state, feed, moving) -> None:
     watch = Watch(params, state, feed, learned=0.0)
     for name, value in moving.items():
@@ -329,6 +336,39 @@ def test_the_rear_comes_back_slowly_and_at_once_with_the_next_braking(watch) -> 
     watch.state["trailing"] = 0.4
     assert watch.run(EQUAL, seconds=1.0) == pytest.approx(0.7)
     assert watch.run(EQUAL, seconds=DT, decel=0.0) == 1.0
+
+
+SLIPPING = [
+    # case, slip fl fr rl rr [%], speed, part of the rest that the leading axle takes
+    ("neither slips", EQUAL, 20.0, 1.0),
+    ("one by 4 %", (-4, -3, -3, -3), 20.0, 1.0),
+    ("one by 6 %", (-3, -6, -3, -3), 20.0, 0.0),
+    ("backwards, a rear one by 4 %", (-3, -3, -4, -3), -8.0, 1.0),
+    ("backwards, a rear one by 6 %", (-3, -3, -3, -6), -8.0, 0.0),
+]
+
+
+@pytest.mark.parametrize(("case", "slip", "speed", "part"), SLIPPING, ids=[row[0] for row in SLIPPING])
+@pytest.mark.parametrize("decel", [0.5, 3.0])
+def test_a_leading_axle_that_slips_takes_nothing_more_until_the_braking_ends(
+    watch, case, slip, speed, part, decel
+) -> None:
+    p, state, backwards = watch.params, watch.state, speed < 0.0
+
+    def taken(asked: float) -> float:
+        state["trailing"] = 0.6
+        distribute(p, state, p["mass"], asked, backwards, DT)
+        full = p["mass"] * asked
+        return 1.0 - (full - np.sum(state["torque"] / p["wheel_radius"])) / (0.4 * full * trails)
+
+    lead = front_share(p, -decel if backwards else decel)
+    trails = lead if backwards else 1.0 - lead
+    watch.run(slip, seconds=0.5, speed=speed, decel=decel)
+    assert taken(decel) == pytest.approx(part), case
+    watch.run(EQUAL, seconds=0.5, speed=speed, decel=decel)
+    assert taken(decel) == pytest.approx(part), "it rolls again in the same braking"
+    distribute(p, state, p["mass"], 0.0, backwards, DT)
+    assert taken(decel) == pytest.approx(1.0), "the next braking"
 
 
 def torques_of(params, pressure, mu) -> np.ndarray:
