@@ -92,16 +92,17 @@ def test_the_motor_never_gives_more_than_is_demanded(params, feed) -> None:
     assert motors.cycle(900.0, 5000.0) == pytest.approx(900.0)
 
 
-@pytest.mark.parametrize("rate", [500.0, 2000.0])
-def test_a_limit_that_falls_is_planned_for_a_tenth_of_a_second_before(params, feed, rate: float) -> None:
-    motors = Motors(params, feed, 1.0, 900.0)
+@pytest.mark.parametrize(("rate", "slowness"), [(500.0, 1.0), (2000.0, 1.0), (1000.0, 0.5), (1000.0, 2.0)])
+def test_a_limit_that_falls_is_planned_for_a_tenth_of_a_second_before(params, feed, rate, slowness) -> None:
+    """As much longer as the hydraulics are slower."""
+    motors = Motors(params, feed, 1.0, 900.0, slowness=slowness)
     motors.settle(800.0)
     for cycle in range(20):
         limit = 900.0 - rate * DT * (cycle + 1)
         asked = motors.cycle(800.0, motor_limit=limit)
         assert asked <= limit
-    assert motors.state["lining"][0] >= 800.0 - (limit - 0.10 * rate)
-    assert motors.state["lining"][0] <= 800.0 - (limit - 0.15 * rate)
+    assert motors.state["lining"][0] >= 800.0 - (limit - 0.10 * slowness * rate)
+    assert motors.state["lining"][0] <= 800.0 - (limit - 0.15 * slowness * rate)
 
 
 @pytest.mark.parametrize("slowness", [0.5, 2.0, 4.0])
@@ -150,19 +151,21 @@ def test_a_wheel_that_the_slip_guard_holds_has_no_motor(params, feed) -> None:
 
 @pytest.mark.parametrize("name", ["motor_limit", "motor_torque"])
 @pytest.mark.parametrize("how", ["invalid", "stale"])
-def test_an_unknown_motor_fades_while_its_lining_takes_over(params, feed, name, how) -> None:
+@pytest.mark.parametrize("i", [0, 3])
+def test_an_unknown_motor_fades_while_its_lining_takes_over(params, feed, name, how, i) -> None:
     motors = Motors(params, feed, 0.7, 1350.0)
     motors.settle(900.0)
-    place = INPUT[f"{name}_fl"]
-    asked = [motors.asked[0]]
+    place = INPUT[f"{name}_{CORNERS[i]}"]
+    asked = [motors.asked[i]]
     for k in range(40):
         if how == "invalid":
             motors.inputs["verdict"][0, place] = 0
         motors.inputs["age_ns"][0, place] = (k + 1) * 10_000_000
         motors.inputs["new"][0, place] = 0
-        asked.append(motors.cycle(900.0, lag=630.0))  # the lining has not moved yet
+        motors.cycle(900.0, lag=630.0)  # the lining has not moved yet
+        asked.append(motors.asked[i])
     at_once = 1 if how == "invalid" else 5  # 50 ms old
-    assert motors.state["lining"][0] == pytest.approx(900.0, rel=1e-3)
+    assert motors.state["lining"][i] == pytest.approx(900.0, rel=1e-3)
     assert np.all(np.diff(asked[at_once:]) <= 1e-9)
     assert asked[at_once + 1] > 600.0
     assert asked[at_once + 25] == 0.0

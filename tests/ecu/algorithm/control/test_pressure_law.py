@@ -143,6 +143,20 @@ def test_the_friction_in_use_moves_no_faster_than_half_a_unit_a_second(dt: float
         assert state["used"] == pytest.approx([0.45 + 0.5 * k * dt, 0.45 - 0.5 * k * dt, 0.45, 0.4501])
 
 
+def test_what_the_confirmation_is_told_are_means_of_the_wheels() -> None:
+    """Base over friction, aimed at and in use: the share of the nominal pressure that they need."""
+    state = law(base=np.array([0.40, 0.42, 0.5, 0.5]))
+    mu = np.array([0.38, 0.40, 0.47, 0.48])
+    for _ in range(100):
+        follow_friction(PARAMS, state, estimated(mu), 0.01)
+    needed = np.mean(state["base"] / mu)
+    assert state["confirmed"]["heading"] == pytest.approx(needed)
+    assert state["confirmed"]["in_use"] == pytest.approx(needed)
+    follow_friction(PARAMS, state, estimated(mu - 0.05), 0.01)
+    assert state["confirmed"]["heading"] == pytest.approx(np.mean(state["base"] / (mu - 0.05)))
+    assert state["confirmed"]["in_use"] == pytest.approx(np.mean(state["base"] / (mu - 0.005)))
+
+
 def test_a_friction_that_is_not_a_number_does_not_stick(params) -> None:
     state = law()
     follow_friction(PARAMS, state, estimated(np.full(4, math.nan)), 0.01)

@@ -99,6 +99,15 @@ def test_limits_hold_for_any_failure(
         assert moment <= limit * (1 + 1e-9) or added <= 1e-6
 
 
+@pytest.mark.parametrize(("failed", "decel"), [((FL, RL), 3.0), ((FL, RL), 5.0), ((FL,), 7.0)])
+def test_what_would_turn_the_car_is_given_up_to_the_limit_and_no_less(params, failed, decel) -> None:
+    car = Replaced(params, failed, decel)
+    acts = np.where(np.isin(range(4), failed), 0.0, car.force)
+    moment = (acts[[FR, RR]].sum() - acts[[FL, RL]].sum()) * car.params["track"] / 2
+    assert moment == pytest.approx(YAW_LIMIT * car.params["mass"] * G * car.params["rear_axle"])
+    assert (car.force[[FR, RR]] > car.before[[FR, RR]]).all()
+
+
 def test_grip_that_no_road_may_have_is_asked_for_slowly(params) -> None:
     """Rear alone at 4 m/s^2: it would take the whole grip of a dry road."""
     for seconds in (0.1, 0.3):
