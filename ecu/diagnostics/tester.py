@@ -130,8 +130,9 @@ def _number(name: str) -> int:
 
 
 def _code(name: str) -> int:
-    """Return a trouble code by its text."""
+    """Return a trouble code by its text, or by its three bytes."""
     known = {code.text: code.number for code in TROUBLE_CODES}
+    known |= {f"{code.number:06X}": code.number for code in TROUBLE_CODES}
     if name.upper() not in known:
         raise UserError("diag clear", name, f"no trouble code of this ECU{closest(name.upper(), known)}")
     return known[name.upper()]

@@ -97,6 +97,9 @@ def test_faults_with_their_snapshots(diag, ecu):
 def test_clearing_one_and_all(diag, ecu):
     assert diag("clear C1010-88 c1001-08", ecu) == (0, "cleared: C1010-88, C1001-08\n", "")
     assert diag("faults", ecu)[0] == 1
+    assert diag("clear 500108", ecu) == (0, "cleared: C1001-08\n", ""), (
+        "its bytes, as docs/diagnostics.md lists them"
+    )
     assert diag("clear", ecu) == (0, "cleared: all\n", "")
     assert diag("faults", ecu) == (0, "no confirmed fault\n", "")
 
