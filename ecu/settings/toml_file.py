@@ -3,7 +3,8 @@
 import os
 import stat
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Final, NamedTuple, get_args, get_origin
 
@@ -86,8 +87,14 @@ def findings(
     """
     found = sorted(error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden")
     return [
-        UserError(file_of(one["loc"]), ".".join(map(str, one["loc"])), _remedy(one, model)) for one in found
+        UserError(file_of(one["loc"]), ".".join(_counted(one["loc"])), _remedy(one, model)) for one in found
     ]
+
+
+def _counted(place: tuple[int | str, ...]) -> Iterator[str]:
+    """Yield the parts of a place, tables of one name numbered from 1."""
+    for part, inner in zip_longest(place, place[1:]):
+        yield str(part + 1 if isinstance(part, int) and isinstance(inner, str) else part)
 
 
 def _remedy(finding: Any, model: type[BaseModel]) -> str:

@@ -62,8 +62,8 @@ WRONG = {
     "c.csv": ("vehicle,log,time\na,1.log,noon\n", r"c\.csv: line 2, time: 'noon' is no time"),
     "d.csv": ("vehicle,log\na,x/1.log\na,y/1.log\n", r"1\.log: two drives of vehicle a have this name"),
     "e.csv": ("vehicle,log\n", r"e\.csv: line 2: no drive"),
-    "a.toml": ('[[vehicle]]\nname = "a"\n', r"a\.toml: vehicle\.0\.drives: missing"),
-    "b.toml": ('[[vehicle]]\nname = "a"\ndrives = []\n', r"b\.toml: vehicle\.0\.drives: give at least 1"),
+    "a.toml": ('[[vehicle]]\nname = "a"\n', r"a\.toml: vehicle\.1\.drives: missing"),
+    "b.toml": ('[[vehicle]]\nname = "a"\ndrives = []\n', r"b\.toml: vehicle\.1\.drives: give at least 1"),
     "c.toml": ("vehicle = 3\n", r"c\.toml: vehicle: "),
 }
 

@@ -67,20 +67,20 @@ def test_an_expectation_is_one_line(keys: dict[str, Any], text: str) -> None:
 @pytest.mark.parametrize(
     ("expect", "said"),
     [
-        ('what = "grip"', "expect.0.what"),
+        ('what = "grip"', "expect.1.what"),
         ('what = "bit"\nbit = "IMU lots"\nwithin = 0.1', "bit: no fault 'IMU lots'; did you mean IMU lost?"),
         ('what = "bit"\nbit = 31\nwithin = 0.1', "bit: no fault 31; docs/faults.md lists them"),
         ('what = "bit"\nwithin = 0.1', "'bit' needs bit"),
         ('what = "bit"\nbit = 1', "'bit' needs within"),
         ('what = "bit"\nbit = 1\nwithin = 0.1\nt = 1.0\nfault = 1', "give either t or fault"),
-        ('what = "bit"\nbit = 1\nwithin = -0.1\n', "expect.0.within: give a value of at least 0 s"),
+        ('what = "bit"\nbit = 1\nwithin = -0.1\n', "expect.1.within: give a value of at least 0 s"),
         ('what = "bit"\nbit = 1\nwithin = 0.1\nfault = 2', "expect: there is no [[fault]] number 2"),
         ('what = "no_bit"\nbit = 1\nwithin = 0.1', "within does not belong to 'no_bit'; remove it"),
         ('what = "mode"\nmode = "active"', "'mode' needs t, or within"),
         ('what = "stopping_distance"', "'stopping_distance' needs at_most or at_least"),
         ('what = "friction_error"\nat_most = 5.0', "'friction_error' needs axle"),
         ('what = "decel_error"', "'decel_error' needs at_most"),
-        ('what = "decel_error"\nat_moist = 1.0', "expect.0.at_moist: unknown key; did you mean at_most?"),
+        ('what = "decel_error"\nat_moist = 1.0', "expect.1.at_moist: unknown key; did you mean at_most?"),
     ],
 )  # fmt: skip
 def test_a_mistake_is_one_line(tmp_path: Path, expect: str, said: str) -> None:

@@ -359,7 +359,7 @@ def test_a_fault_begins_when_its_condition_holds(tmp_path: Path, when: str, reac
 @pytest.mark.parametrize(
     ("fault", "line"),
     [
-        ('kind = "broken"', "fault.0.kind"),
+        ('kind = "broken"', "fault.1.kind"),
         ('kind = "lost"\nwhen = "slow"', "'slow' is no condition; write it as vehicle_speed < 15"),
         ('kind = "lost"\nwhen = "speed < 15"', "'speed' is not one of the ECU's inputs"),
         ('kind = "lost"\nwhen = "wheel_speed < 15"', "'wheel_speed' is not one of"),

@@ -75,7 +75,7 @@ def test_every_mistake_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert cli.main(["vehicle", str(path), "-i", "virtual", "-c", "x"]) == 2
     said = [line.removeprefix(f"brake-ecu: {path}: ") for line in capsys.readouterr().err.splitlines()]
     places = [line.partition(": ")[0] for line in said]
-    assert sorted(places) == ["initial_speed", "name", "phase.0.seconds", "plant"]
+    assert sorted(places) == ["initial_speed", "name", "phase.1.seconds", "plant"]
 
 
 @pytest.mark.parametrize(
@@ -85,8 +85,8 @@ def test_every_mistake_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[st
             GOOD.replace("initial_speed", "initial_spede"),
             "initial_spede: unknown key; did you mean initial_speed?",
         ),
-        (GOOD + "colour = 3\n", "phase.0.colour: unknown key"),
-        (GOOD.replace('"brake"', '"skid"'), "phase.0.kind"),
+        (GOOD + "colour = 3\n", "phase.1.colour: unknown key"),
+        (GOOD.replace('"brake"', '"skid"'), "phase.1.kind"),
         (GOOD.replace("until_speed = 0.0", ""), "never ends; give until_speed or seconds"),
         (GOOD.replace("decel = 4.0", ""), "one of decel, pedal and kept_decel"),
         (GOOD.replace("decel = 4.0", "decel = inf"), "finite number"),
@@ -107,7 +107,7 @@ def test_every_mistake_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[st
         ("charge_limit = [[1.0, 1e5], [0.5, 0.0]]" + GOOD, "charge_limit: give rows of rising time"),
         ("charge_limit = -1.0" + GOOD, "charge_limit: give values of at least 0"),
         ("motor_share = 0.5\nblending = true" + GOOD, "either blending (by the ECU) or motor_share"),
-        (GOOD + "pedal_speed = 0.0", "phase.0.pedal_speed: give a value above 0"),
+        (GOOD + "pedal_speed = 0.0", "phase.1.pedal_speed: give a value above 0"),
         (GOOD + "kept_decel = 3.0", "one of decel, pedal and kept_decel"),
         (GOOD + "[tyre_fault]\ntime = 4.0", "tyre_fault.stiffness: missing"),
         (GOOD + "[steering]\nangle = [[0.0, 0.0]]\npath = [[0.0, 0.0]]", "either angle (by time) or path"),

@@ -229,7 +229,8 @@ def read_file(path: Path, model: type[Model]) -> Model:
         raise PlantFileError(str(path), "not valid TOML", str(error)) from error
     except ValidationError as error:
         first = error.errors()[0]
-        raise PlantFileError(str(path), ".".join(map(str, first["loc"])), first["msg"]) from error
+        place = ".".join(str(part + isinstance(part, int)) for part in first["loc"])  # the first is 1
+        raise PlantFileError(str(path), place, first["msg"]) from error
 
 
 def load_plant(path: Path) -> Plant:

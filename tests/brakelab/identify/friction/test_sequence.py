@@ -67,4 +67,4 @@ def test_a_section_without_levels_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(text, "utf-8")
     with pytest.raises(PlantFileError) as caught:
         load_sequence(tmp_path / "mine.toml")
-    assert caught.value.place == "section.0.level"
+    assert caught.value.place == "section.1.level"
