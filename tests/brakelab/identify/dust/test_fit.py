@@ -12,11 +12,12 @@ from brakelab.identify.dust.fit import (
     conformal,
     inside_of,
     judge,
+    judge_all,
     kpis,
     ranges,
     spearman,
 )
-from brakelab.identify.dust.model import Model
+from brakelab.identify.dust.model import Model, Samples, fit_law
 
 pytestmark = pytest.mark.study
 
@@ -50,6 +51,21 @@ def test_a_winter_trip_is_within_what_it_was_trained_on():
     assert low[3] < made[0].features[:, 3].min() < 0.0
     assert (low[[0, 1, 2, 4, 5]] > 0.0).all()
     assert inside_of(made[0].features, (low, high)).all()
+
+
+def test_models_are_trained_by_one_thread(monkeypatch: pytest.MonkeyPatch):
+    """Threads that wait for each other beside four other programs took 136 s for 14 s."""
+    from threadpoolctl import threadpool_info
+
+    threads: list[int] = []
+
+    def fit(samples: Samples, seed: int) -> Model:
+        threads.extend(pool["num_threads"] for pool in threadpool_info())
+        return fit_law(samples, seed)
+
+    monkeypatch.setattr("brakelab.identify.dust.fit.FITS", {"law": fit})
+    judge_all(trips(1)[:4], [])
+    assert set(threads) == {1}
 
 
 def test_conformal_intervals_hold_95_percent():

@@ -131,7 +131,11 @@ def judge(name: str, trips: list[Applications], test: list[Applications], seed: 
 
 def judge_all(trips: list[Applications], test: list[Applications], seed: int = 0) -> list[Judged]:
     """Judge every model of `FITS`."""
-    return [judge(name, trips, test, seed) for name in FITS]
+    import sklearn.ensemble  # noqa: F401  the threads that are limited
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):  # so few rows gain nothing, and threads that wait take a CPU from others
+        return [judge(name, trips, test, seed) for name in FITS]
 
 
 def choose(judged: list[Judged]) -> Judged:
