@@ -6,6 +6,7 @@ import pytest
 
 from brakelab.identify.manifest import read_manifest
 from ecu.errors import UserError
+from tests.brakelab.logs.test_workbook import workbook
 
 MANIFEST = "block,file,mass_before\nkühl,b1.csv,905.123\n"
 EXPORTS = {
@@ -30,6 +31,25 @@ def test_a_manifest_is_what_a_spreadsheet_writes(tmp_path: Path, text: bytes) ->
     ((line, found),) = read_manifest(tmp_path / "manifest.csv")
     assert found == row
     assert text.splitlines()[line - 1].find(b"b1.csv") > 0 or text[:2] == b"\xff\xfe"
+
+
+@pytest.mark.parametrize(
+    "grams", ["1.905,123", "1,905.123", "1 905,123", "1'905.123", "+1905.123", "1905,123"]
+)
+def test_masses_above_a_kilogram_are_numbers(tmp_path: Path, grams: str) -> None:
+    (tmp_path / "manifest.csv").write_text(MANIFEST.replace(",", ";").replace("905.123", grams))
+    ((_, found),) = read_manifest(tmp_path / "manifest.csv")
+    assert float(found["mass_before"]) == 1905.123
+
+
+def test_a_manifest_is_a_workbook(tmp_path: Path) -> None:
+    heads = "".join(f'<c t="inlineStr"><is><t>{name}</t></is></c>' for name in ("block", "file", "mass [kg]"))
+    cells = '<c t="inlineStr"><is><t>cold</t></is></c><c t="inlineStr"><is><t>b1.csv</t></is></c>'
+    rows = f'<row r="1">{heads}</row><row r="4">{cells}<c><v>0.905123</v></c></row>'
+    (tmp_path / "manifest.xlsx").write_bytes(workbook(rows))
+    assert read_manifest(tmp_path / "manifest.xlsx") == [
+        (4, {"block": "cold", "file": "b1.csv", "mass": "905.123"})
+    ]
 
 
 def test_a_unit_that_is_not_known_is_refused(tmp_path: Path) -> None:

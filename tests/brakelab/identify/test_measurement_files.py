@@ -127,3 +127,17 @@ def test_a_measurement_counts_once(tmp_path: Path, rows: tuple[str, ...], line: 
 )
 def test_a_column_has_the_numbers_of_its_cells(cells: list[str | None]) -> None:
     np.testing.assert_array_equal(numbers_in(pa.array(cells, pa.string())), numbers_of(cells))
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "between"),
+    [
+        ("12.03.2024 23:59:59.5", "13.03.2024 00:00:01", 1.5),
+        ("2024-03-12T10:23:45.12Z", "2024-03-12T10:23:46.12Z", 1.0),
+        ("2024-03-12 10:23:45+01:00", "2024-03-12 10:24:45+01:00", 60.0),
+        ("03/25/2024 11:59:58 AM", "03/25/2024 12:00:00 PM", 2.0),
+        ("10:23:45,120", "10:23:45,620", 0.5),
+    ],
+)
+def test_a_date_is_a_time(first: str, second: str, between: float) -> None:
+    np.testing.assert_allclose(np.diff(numbers_of([first, second])), [between], atol=1e-6)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from brakelab.logs.csv_header import split_title
+from brakelab.logs.workbook import MAGIC, sheet_rows
 from ecu.errors import UserError
 from ecu.settings.toml_file import read_toml
 
@@ -15,6 +16,7 @@ NAMES: Final = ("file", "block", "trip", "test", "programme", "road_energy")
 """Columns of a manifest that measure nothing."""
 UTF16: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _DECIMAL: Final = re.compile(r"^([-+]?\d+),(\d+)$")
+_THOUSANDS: Final = re.compile(r"[-+]?\d{1,3}(?:([.,' ])\d{3})+(?!\1)[.,]\d*")
 _SEPARATOR: Final = re.compile(r'"?sep=.?"?', re.IGNORECASE)
 """First line of a CSV file that Excel wrote for itself."""
 _WEIGHED: Final = {
@@ -26,7 +28,7 @@ _NOTHING: Final = ("-", "–", "n/a", "na", "nan")
 
 
 def read_manifest(path: Path, given: Path | None = None) -> list[tuple[int, dict[str, str]]]:
-    """Return the rows of a CSV manifest, each with its line in the file; decimal commas are points.
+    """Return the rows of a manifest, CSV or .xlsx, each with its line in the file; decimal commas are points.
 
     Units in brackets behind the names or in a row below them are converted to g, mm and mg; rows without a
     word count for nothing.
@@ -41,15 +43,12 @@ def read_manifest(path: Path, given: Path | None = None) -> list[tuple[int, dict
     try:
         text = path.read_bytes()
     except OSError as error:
-        raise UserError(str(path), "", f"cannot be read ({error.strerror}); give a CSV manifest") from None
-    if text[:2] not in UTF16 and b"\0" in text:
-        raise UserError(str(path), "", "is no text; save it as CSV: a table that names the measured files")
-    lines = _decoded(text).splitlines(keepends=True)
-    skipped = 1 if lines and _SEPARATOR.fullmatch(lines[0].strip()) else 0
-    delimiter = max(",;\t", key="".join(lines[skipped : skipped + 1]).count)
-    table = csv.reader(lines[skipped:], delimiter=delimiter)
-    columns = _renamed(path, [split_title(title) for title in next(table, [])], given)
-    rows = [(table.line_num + skipped, [cell.strip() for cell in row]) for row in table if any(row)]
+        raise UserError(
+            str(path), "", f"cannot be read ({error.strerror}); give a manifest as CSV or .xlsx"
+        ) from None
+    table = sheet_rows(str(path), text) if text.startswith(MAGIC) else _lines(path, text)
+    rows = [(line, [cell.strip() for cell in row]) for line, row in table if any(row)]
+    columns = _renamed(path, [split_title(title) for title in rows.pop(0)[1]] if rows else [], given)
     units = [unit for _, unit in columns]
     if rows and _is_units(rows[0][1]):
         units = [
@@ -61,6 +60,18 @@ def read_manifest(path: Path, given: Path | None = None) -> list[tuple[int, dict
         (line, {name: _cell(text, by) for (name, by), text in zip(known, row, strict=False) if name})
         for line, row in rows
     ]
+
+
+def _lines(path: Path, text: bytes) -> list[tuple[int, list[str]]]:
+    """Return the cells of each line of CSV with its number."""
+    if text[:2] not in UTF16 and b"\0" in text:
+        remedy = "is no text; save it as CSV or .xlsx: a table that names the measured files"
+        raise UserError(str(path), "", remedy)
+    lines = _decoded(text).splitlines(keepends=True)
+    skipped = 1 if lines and _SEPARATOR.fullmatch(lines[0].strip()) else 0
+    delimiter = max(",;\t", key="".join(lines[skipped : skipped + 1]).count)
+    table = csv.reader(lines[skipped:], delimiter=delimiter)
+    return [(table.line_num + skipped, row) for row in table]
 
 
 def _renamed(path: Path, columns: list[tuple[str, str]], given: Path | None) -> list[tuple[str, str]]:
@@ -98,6 +109,8 @@ def _factor(path: Path, name: str, unit: str) -> float:
 
 
 def _cell(text: str, factor: float) -> str:
+    if grouped := _THOUSANDS.fullmatch(text):
+        text = text.replace(grouped[1], "")
     plain = "" if text.lower() in _NOTHING else _DECIMAL.sub(r"\1.\2", text)
     try:
         return plain if factor == 1.0 else f"{factor * float(plain):.12g}"

@@ -41,6 +41,7 @@ CONTRACT: Final = {
 """Quantity and unit of the columns of blocks and trips."""
 _DATE: Final = re.compile(
     r"(?:(\d{1,4})[-./](\d{1,2})[-./](\d{1,4})[T ]+)?(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d*)?)"
+    r"(?: ?([AP])M| ?Z|[+-]\d{2}:?\d{2})?"
 )
 _EPOCH: Final = datetime.date(2000, 1, 1).toordinal()
 """Seconds are counted from here: of today's dates a microsecond is left."""
@@ -219,7 +220,7 @@ def _seconds(cell: str) -> float:
     found = _DATE.fullmatch(cell.strip().strip('"'))
     if not found:
         return np.nan
-    *date, hours, minutes, seconds = found.groups()
+    *date, hours, minutes, seconds, half = found.groups()
     days = 0
     if date[0]:
         year, month, day = date if len(date[0]) == 4 else reversed(date)
@@ -227,7 +228,8 @@ def _seconds(cell: str) -> float:
             days = datetime.date(int(year), int(month), int(day)).toordinal() - _EPOCH
         except ValueError:  # the month first
             days = datetime.date(int(year), int(day), int(month)).toordinal() - _EPOCH
-    return 86400.0 * days + 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
+    hour = int(hours) % 12 + (12 if half == "P" else 0) if half else int(hours)
+    return 86400.0 * days + 3600.0 * hour + 60.0 * int(minutes) + float(seconds.replace(",", "."))
 
 
 def _checked(path: Path, columns: dict[str, Array], counts: Sequence[str]) -> dict[str, Array]:
