@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from brakelab.identify.vehicle.reader import PRESENT, check, drive_of
+from brakelab.identify.vehicle.reader import PRESENT, check, contradictions, drive_of
+from brakelab.logs.physics.samples import Collector
 from ecu.errors import UserError
 
-from .example import drive, samples, suv
+from .example import RADIUS, drive, samples, suv
 
 
 def test_halves_are_of_different_samples():
@@ -64,3 +65,25 @@ def test_what_physics_finds_wrong_is_reported_but_a_zero_is_not():
     )
     with pytest.raises(UserError, match="turned against dv/dt; factor = -1 \\(1 more"):
         check(good, ["accel_x: turned against dv/dt; factor = -1", "yaw_rate: 57 times"], suv()[0])
+
+
+@pytest.mark.parametrize(
+    ("radius", "line"),
+    [
+        pytest.param(0.33, None, id="any car's"),
+        pytest.param(0.42, None, id="a pick-up's, near START's"),
+        pytest.param(1.0 / 3.6, "all read", id="km/h"),
+        pytest.param(1.0, "all read", id="m/s"),
+    ],
+)
+def test_tyres_are_any_car_s_or_start_s(radius: float, line: str | None):
+    """START's are 0.42 m."""
+    start = suv()
+    start["wheel_radius"] = 0.42
+    speed = 20.0 + 8.0 * np.sin(0.1 * np.arange(20_000) * 0.01)
+    rows = samples(200.0, speed, vehicle_speed=speed)
+    rows[:, [PRESENT[f"wheel_speed_{corner}"] for corner in ("fl", "fr", "rl", "rr")]] *= RADIUS / radius
+    collector = Collector()
+    collector.add(rows)
+    found = contradictions(collector.series(), start[0])
+    assert not found if line is None else line in found[0]
