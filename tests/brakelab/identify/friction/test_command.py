@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from brakelab.cli import app
 from brakelab.identify.friction import choice, command
-from brakelab.identify.friction.choice import Judged, choose, hottest
+from brakelab.identify.friction.choice import Job, Judged, choose, hottest, judge
 from brakelab.identify.friction.columns import Columns, load_columns
 from brakelab.identify.friction.fit import error_of
 from brakelab.identify.friction.reader import read_recording
@@ -17,6 +17,7 @@ from brakelab.identify.friction.stops import Stops, find_stops
 from brakelab.plant.description import read_file
 from brakelab.plant.dynamometer import nominal_friction
 from brakelab.plant.friction.constant import Constant
+from brakelab.plant.friction.law import Law, RigBrake
 from brakelab.plant.friction.own import Own
 from brakelab.plant.linings import Lining, Linings, rig_with
 from ecu.errors import UserError
@@ -184,9 +185,9 @@ def test_recordings_of_two_brakes_are_not_one(tmp_path: Path) -> None:
         command.look([tmp_path / "A.csv", tmp_path / "B.csv"], None)
 
 
-def judged(name: str, held_out: float, criterion: float) -> Judged:
+def judged(name: str, overall: float, criterion: float) -> Judged:
     law = Constant(law="constant", rig_mass=1.0, mu=0.4)
-    return Judged(name, law, False, 1, 1.0, held_out, "stays" in name, criterion, (), (), "4 of 4", "")
+    return Judged(name, law, False, 1, 1.0, 1.0, overall, "stays" in name, criterion, (), (), "4 of 4", "")
 
 
 @pytest.mark.parametrize(
@@ -197,19 +198,43 @@ def judged(name: str, held_out: float, criterion: float) -> Judged:
         ([("a", 4.00, -10.0), ("b", 4.25, -90.0)], "a"),
         ([("a", 4.00, -90.0), ("stays", 4.95, -10.0)], "stays"),
         ([("a", 4.00, -90.0), ("stays", 5.05, -10.0)], "a"),
-        ([("a", 4.00, -90.0), ("stays", 4.30, -10.0), ("stays too", 4.90, -20.0)], "stays too"),
+        ([("a", 4.00, -90.0), ("stays", 4.30, -10.0), ("stays too", 4.90, -20.0)], "stays"),
+        ([("a", 4.00, -90.0), ("stays", 4.30, -10.0), ("stays too", 4.45, -20.0)], "stays too"),
     ],
     ids=[
-        "least error unseen",
+        "least error",
         "a tie goes to the criterion",
         "more than 5 % is no tie",
         "what stays beyond the data comes first",
         "unless it is worse by a quarter",
-        "of two that stay the one of less criterion",
+        "of two that stay the better",
+        "of two that stay and tie the one of less criterion",
     ],
 )
 def test_the_choice(laws: list[tuple[str, float, float]], expected: str) -> None:
     assert choose(tuple(judged(*law) for law in laws)).name == expected
+
+
+def test_a_law_is_judged_as_it_is_used(
+    stops: Stops, columns: Columns, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ostermeyer's is fitted from the friction that each stop began with, which a car does not measure."""
+
+    def error(law: Law, brake: RigBrake, judged: Stops, starts_at_measured: bool, closed: bool) -> float:
+        assert closed
+        assert not starts_at_measured
+        return 3.0 if len(judged) == len(stops) else 4.0
+
+    monkeypatch.setattr(choice, "error_of", error)
+    found = judge(Job("ostermeyer", columns.brake, stops, None, ()))
+    assert found.starts_at_measured
+    assert found.overall == pytest.approx(np.sqrt(0.8 * 3.0**2 + 0.2 * 4.0**2))
+
+
+def test_a_programme_that_is_given_decides_alone(stops: Stops, columns: Columns) -> None:
+    seen, unseen = hottest(stops)
+    found = judge(Job("constant", columns.brake, seen, unseen, ()))
+    assert found.overall == found.held_out == error_of(found.law, columns.brake, unseen, False, closed=True)
 
 
 def test_held_out_are_the_hottest(stops: Stops) -> None:

@@ -17,7 +17,9 @@ from brakelab.results.text_table import Table
 
 def test_the_page_of_a_constant(tmp_path: Path, columns: Columns, stops: Stops) -> None:
     law = Constant(law="constant", rig_mass=1.0, mu=float(stops.mu.mean()))
-    judged = Judged("constant", law, False, 1, 5.0, 6.0, True, 0.0, (), ("<mu>",), "4 of 4", "knows no fade")
+    judged = Judged(
+        "constant", law, False, 1, 5.0, 6.0, 5.2, True, 0.0, (), ("<mu>",), "4 of 4", "knows no fade"
+    )
     span = (1.0, 9.0)
     identified = Identified((judged,), judged, len(stops), span, (1e6, 7e6), (80.0, 250.0))
     path = tmp_path / "brake.html"

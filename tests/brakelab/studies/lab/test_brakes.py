@@ -56,7 +56,7 @@ def test_the_thesis_s_loadings_give_these_shares_of_variance(brake: str, share: 
 
 def test_a_constant_on_ams_errs_by_its_distance(ams: Stops) -> None:
     law = Constant(law="constant", rig_mass=996.0, mu=0.40)
-    judged = Judged("constant", law, False, 1, 0.0, 0.0, True, 0.0, (), (), "", "")
+    judged = Judged("constant", law, False, 1, 0.0, 0.0, 0.0, True, 0.0, (), (), "", "")
     found = on_ams(judged, linings().lining["A"], ams)
     assert len(ams) == len(TEMPERATURES)
     expected = 100.0 * (0.40 / ams.mean - 1.0)
@@ -100,7 +100,9 @@ def test_a_choice_is_judged_by_ams_alone() -> None:
             "A",
             3,
             SimpleNamespace(
-                identified=SimpleNamespace(chosen=Judged(name, law, False, 1, 0, 0, True, 0, (), (), "", "")),
+                identified=SimpleNamespace(
+                    chosen=Judged(name, law, False, 1, 0, 0, 0, True, 0, (), (), "", "")
+                ),
                 ams=ams,
                 seconds=1.0,
             ),

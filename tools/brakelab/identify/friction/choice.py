@@ -2,12 +2,13 @@
 
 Choice. Every law is identified twice: on all stops, and without those held out. Held out is the programme
 that was given for it, else the fifth of the stops that begin hottest: a law that only copies what it saw
-shows itself there. It is judged in closed loop, where it is used: with the measured pressure a law that loses
-the brake costs nothing, for the answer is given. Least error on what is held out wins; of laws within 5 % of
-it, the least information criterion (Schwarz's, with stops as observations, since the residuals of one stop
-hang together). But what is held out lies 25 K beyond the rest, and a car brakes 100 K hotter than a
-programme: a law that goes on beyond the data must be better by a quarter than every one that stays what it is
-at their edge; of those within the quarter, the least criterion.
+shows itself there. It is judged as it is used: in closed loop, for with the measured pressure a law that
+loses the brake costs nothing, and from its own memory at the start of every stop, which no car measures.
+Without a programme that was given, the other four fifths count as well as the hottest: a law that is right
+when hot alone is wrong in most stops. Least error wins; of laws within 5 % of it, the least information
+criterion (Schwarz's, with stops as observations, since the residuals of one stop hang together). But what is
+held out lies 25 K beyond the rest, and a car brakes 100 K hotter than a programme: a law that goes on beyond
+the data must be better by a quarter than every one that stays what it is at their edge.
 """
 
 from collections.abc import Callable, Sequence
@@ -38,7 +39,8 @@ class Judged(NamedTuple):
     starts_at_measured: bool
     free: int
     error: float  # nRMSE [%] on what it was identified with
-    held_out: float  # nRMSE [%] on what it had not seen, in closed loop
+    held_out: float  # nRMSE [%] on what it had not seen, as it is used
+    overall: float  # nRMSE [%] by which the law is chosen
     bounded: bool  # beyond the data stays what it is at their edge
     criterion: float  # less is better
     numbers: tuple[tuple[str, str, float, float], ...]  # name, unit, value, half of the interval of 95 %
@@ -58,7 +60,9 @@ class Identified(NamedTuple):
     temperature: tuple[float, float]  # degC
 
 
-class _Job(NamedTuple):
+class Job(NamedTuple):
+    """What is identified and judged; without `unseen` by the hottest of `stops`."""
+
     name: str
     brake: RigBrake
     stops: Stops
@@ -95,7 +99,7 @@ def identify(
     `progress` receives a line for each law; `own`: files and entry points of own laws. Two processes.
     """
     names = [candidate.name for candidate in known_candidates(columns, stops, own)]
-    jobs = [_Job(name, columns.brake, stops, unseen, own) for name in names]
+    jobs = [Job(name, columns.brake, stops, unseen, own) for name in names]
     done: dict[str, Judged] = {}
     with new_pool(PROCESSES) as pool:
         running = [pool.submit(judge, job) for job in reversed(jobs)]  # the slowest first
@@ -117,7 +121,7 @@ def identify(
     )
 
 
-def judge(job: _Job) -> Judged:
+def judge(job: Job) -> Judged:
     """Return one law identified and judged."""
     candidate = next(c for c in candidates(job.stops, job.brake, job.own) if c.name == job.name)
     fitted = fit(candidate, job.brake, job.stops)
@@ -126,7 +130,9 @@ def judge(job: _Job) -> Judged:
         law = refit(fitted, job.brake, seen)
     else:
         law, unseen = fitted.law, job.unseen
-    held_out = error_of(law, job.brake, unseen, candidate.starts_at_measured, closed=True)
+    held_out = error_of(law, job.brake, unseen, False, closed=True)
+    seen_error = error_of(fitted.law, job.brake, job.stops, False, closed=True)
+    shares = (0.0, 1.0) if job.unseen is not None else (1.0 - HELD_OUT, HELD_OUT)
     return Judged(
         candidate.name,
         fitted.law,
@@ -134,6 +140,7 @@ def judge(job: _Job) -> Judged:
         candidate.size,
         100.0 * float(np.sqrt(np.mean(fitted.residuals**2)) / np.mean(job.stops.mu)),
         held_out,
+        float(np.sqrt(shares[0] * seen_error**2 + shares[1] * held_out**2)),
         candidate.bounded,
         criterion(fitted, job.stops),
         tuple(
@@ -154,11 +161,12 @@ def criterion(fitted: Fitted, stops: Stops) -> float:
 
 
 def choose(laws: tuple[Judged, ...]) -> Judged:
-    """Return the law of least error on held-out data; see above for ties."""
-    least = min(judged.held_out for judged in laws)
-    staying = [judged for judged in laws if judged.bounded and judged.held_out <= STAYS * least]
-    tied = [judged for judged in laws if judged.held_out <= TIE * least]
-    return min(staying or tied, key=lambda judged: judged.criterion)
+    """Return the law of least error; see above for ties."""
+    least = min(judged.overall for judged in laws)
+    staying = [judged for judged in laws if judged.bounded and judged.overall <= STAYS * least]
+    among = staying or laws
+    best = min(judged.overall for judged in among)
+    return min((one for one in among if one.overall <= TIE * best), key=lambda one: one.criterion)
 
 
 def _span(values: np.ndarray) -> tuple[float, float]:

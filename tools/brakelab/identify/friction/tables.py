@@ -27,6 +27,7 @@ def law_tables(identified: Identified, unseen: str) -> list[Table]:
             str(judged.free),
             f"{judged.error:.2f}",
             f"{judged.held_out:.2f}",
+            f"{judged.overall:.2f}",
             f"{judged.criterion:.0f}",
             judged.starts,
         )
@@ -44,10 +45,16 @@ def law_tables(identified: Identified, unseen: str) -> list[Table]:
     )
     chosen = (
         f"Unseen: {unseen}, in closed loop: the measured torque is demanded, the pressure follows from the "
-        f"law. Chosen: {identified.chosen.name}."
+        "law, whose memory starts as on a car. Overall: the law is chosen by it; all stops by their number, "
+        f"or what is unseen where it was given. Chosen: {identified.chosen.name}."
     )
     return [
-        Table("Laws", ("law", "numbers", "nRMSE [%]", "unseen [%]", "criterion", "agree"), errors, chosen),
+        Table(
+            "Laws",
+            ("law", "numbers", "nRMSE [%]", "unseen [%]", "overall [%]", "criterion", "agree"),
+            errors,
+            chosen,
+        ),
         Table("Where laws end", ("law", "numbers not identified by these stops", "note"), limits, seen),
     ]
 
