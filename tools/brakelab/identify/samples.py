@@ -13,6 +13,7 @@ APART: Final = 100.0  # likewise, between stops whose time begins anew
 NEAR: Final = 5  # samples, of which the median shows what is usual: two may be mistyped
 FEWEST_SAMPLES: Final = 50  # samples that show a range
 BEYOND: Final = 3.0  # times the range of what is usual: noise alone stays within
+LONGEST_GAP: Final = 0.5  # s between two samples of a rig's column
 PEAKS: Final = 100.0  # likewise, of a particle counter
 
 

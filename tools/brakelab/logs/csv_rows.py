@@ -90,6 +90,29 @@ def _pointed(column: "pa.Array[Any]") -> "pa.Array[Any]":
     return pc.replace_substring(column, ",", ".")
 
 
+def _without_groups(columns: list["pa.Array[Any]"]) -> list["pa.Array[Any]"]:
+    """Return columns, those of whole numbers without the mark of thousands, `987` and `1.234`.
+
+    A point is one where other columns have decimal commas, and the reverse.
+    """
+    import pyarrow.compute as pc  # see `signal_batches`
+
+    def some(column: "pa.Array[Any]", form: str) -> bool:
+        return bool(pc.any(pc.match_substring_regex(column, form)).as_py())
+
+    for thousands, point in ((".", ","), (",", ".")):
+        if not any(some(column, rf"^\s*[-+]?\d+\{point}\d+\s*$") for column in columns):
+            continue
+        grouped = rf"[1-9]\d{{0,2}}(\{thousands}\d{{3}})+"
+        for place, column in enumerate(columns):
+            whole = pc.match_substring_regex(column, rf"^\s*[-+]?(\d{{1,3}}|{grouped})\s*$")
+            if pc.all(whole).as_py() and all(
+                some(column, rf"^\s*[-+]?{form}\s*$") for form in (r"\d{1,3}", grouped)
+            ):
+                columns[place] = pc.replace_substring(column, thousands, "")
+    return columns
+
+
 def _parsed(
     text: bytes,
     line: int,
@@ -135,5 +158,7 @@ def _parsed(
         lines = np.delete(lines, [row for row, _ in wrong])
     columns = [table.column(name).combine_chunks() for name in wanted]
     if pointed:
+        if b"," in text and b"." in text:
+            columns = _without_groups(columns)
         columns = [_pointed(column) for column in columns]
     return lines, pa.RecordBatch.from_arrays(columns, names=wanted)

@@ -115,6 +115,36 @@ def test_thousands_are_numbers(tmp_path: Path, recording: Recording, strange: Wr
     assert read.recording.speed == pytest.approx(recording.speed, abs=1e-4)
 
 
+def test_whole_numbers_with_thousands_are_numbers(
+    tmp_path: Path, recording: Recording, strange: Write
+) -> None:
+    """987 and 1.234 N m beside decimal commas: the hardest stops were left out as dead ones."""
+    strange(tmp_path, recording)
+    path = tmp_path / "strange.csv"
+    columns = path.with_suffix(".toml")
+    columns.write_text(columns.read_text("utf-8").replace('"kN m"', '"N m"'), "utf-8")
+    at = path.read_text("utf-8").splitlines()[0].split(";").index("M_B")
+
+    def whole(_: int, cells: list[str]) -> list[str]:
+        torque = f"{1e3 * float(cells[at].replace(',', '.')):,.0f}".replace(",", ".")
+        return [*cells[:at], torque, *cells[at + 1 :]]
+
+    read = read_recording(_export(path, whole))
+    assert recording.torque.max() > 1000.0
+    assert np.abs(read.recording.torque) == pytest.approx(np.abs(recording.torque), abs=0.6)
+
+
+def test_a_thermocouple_slower_than_the_rest_is_read(
+    tmp_path: Path, recording: Recording, strange: Write
+) -> None:
+    path = strange(tmp_path, recording)
+    at = path.read_text("utf-8").splitlines()[0].split(";").index("T_Scheibe")
+    _export(path, lambda row, cells: cells if row % 10 == 0 else [*cells[:at], "", *cells[at + 1 :]])
+    read = read_recording(path)
+    assert read.damaged == ""
+    assert read.recording.temperature == pytest.approx(recording.temperature, abs=3.0)
+
+
 @pytest.mark.parametrize("form", ["%d.%m.%Y %H:%M:%S", "%Y-%m-%dT%H:%M:%S", "%m/%d/%Y %H:%M:%S"])
 def test_dates_are_times(tmp_path: Path, recording: Recording, strange: Write, form: str) -> None:
     """From before midnight on."""

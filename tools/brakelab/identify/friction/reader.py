@@ -15,7 +15,7 @@ from brakelab.arrays import Vector
 from brakelab.identify.friction.columns import ENDS, Columns, load_columns
 from brakelab.identify.friction.recording import NAMES, Recording
 from brakelab.identify.measurement_files import header_of, numbers_in
-from brakelab.identify.samples import alone, continued
+from brakelab.identify.samples import LONGEST_GAP, alone, bridged, continued
 from brakelab.identify.units import UNITS, ZEROS
 from brakelab.logs.csv_rows import csv_rows
 from brakelab.logs.log_quality import Damage
@@ -28,6 +28,7 @@ LEAST_SAMPLES: Final = 100
 LEAST_STOPS: Final = 5  # of summaries
 STEP_S: Final = 0.01  # of the samples that stand for a summary
 PAUSE_S: Final = 60.0  # between two of them
+SLOWER: Final = 0.3  # share of a column's cells that are empty because it is sampled less often than others
 PLACES = {".csv": ("line", 2), ".txt": ("line", 2), ".parquet": ("row", 1), ".mf4": ("sample", 1)}
 """Name of a row for each file ending, and the number of the first."""
 
@@ -76,6 +77,8 @@ def read_recording(path: Path, columns: Path | None = None, known: Columns | Non
         said = f"{word} {lines[row]} ({names[which]} {raw[which, row]:g} stands alone)"
         damage.note_damage(int(lone.sum()), said)
         lines, raw, labels = lines[~lone], raw[:, ~lone], labels[~lone]
+    if not ends:
+        raw = _filled(raw, described)
     whole = np.isfinite(raw)
     missing = ~whole.all(axis=0)
     if missing.any():
@@ -99,6 +102,16 @@ def read_recording(path: Path, columns: Path | None = None, known: Columns | Non
     )
     cut = f"{path}: {damage.cut}" if damage.cut else ""
     return Read(_in_si(raw, described), described, labels, "; ".join(part for part in (note, cut) if part))
+
+
+def _filled(raw: Vector, described: Columns) -> Vector:
+    """Return samples, shape (5, n), those of columns that are slower than the others interpolated."""
+    slow = np.isnan(raw).mean(axis=1) > SLOWER
+    if not slow.any() or not np.isfinite(raw[0]).all():
+        return raw
+    t = UNITS["time"][described.columns.time[1]] * continued(raw[0])
+    columns = zip(raw, slow, strict=True)
+    return np.array([bridged(t, values, LONGEST_GAP) if late else values for values, late in columns])
 
 
 def _as_samples(

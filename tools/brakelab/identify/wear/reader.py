@@ -21,7 +21,7 @@ from brakelab.identify.friction.recording import Recording
 from brakelab.identify.friction.sequence import read_sequence
 from brakelab.identify.manifest import read_manifest, refuse_row
 from brakelab.identify.measurement_files import check_celsius, read_columns
-from brakelab.identify.samples import bridged
+from brakelab.identify.samples import LONGEST_GAP, bridged
 from brakelab.identify.wear.reproduced import Reproduced, reproduced
 from brakelab.identify.wear.weighings import Lost, read_lost
 from brakelab.results.wear import regressors_of
@@ -36,7 +36,6 @@ IN_ORDER: Final = ("t", "calliper_pressure", "brake_torque", "omega", "disc_temp
 FEWEST_APPLICATIONS: Final = 100  # applications of a block; the thesis has 250 and more
 PRESSED: Final = 1.0  # bar
 SHORTEST_APPLICATION: Final = 0.1  # s of an application
-LONGEST_GAP: Final = 0.5  # s between two samples of a column
 SLOPE_S: Final = 0.2  # s to either side, for the slope of the speed
 HIGHEST_TEMPERATURE: Final = 1100.0  # degC
 SPECIFIC: Final = (2e-3, 20.0)  # g/MJ: linings 0.05 to 1, some tens of times less or more where cold or hot
