@@ -33,8 +33,14 @@ CLIMATE: Final = 0.10  # standard deviation of the logarithm
 CLIMATE_KM: Final = 1_000.0  # over which it changes
 EVENNESS: Final = 0.7  # of the mix of drivers and roads between two measurements; small: one dominates
 DYNAMOMETER_CAR: Final = 1000  # its linings are of another lot
-MEASURED_ONCE: Final = 4  # point, at 10,000 km
-MODES: Final = ("law alone", "one measurement", "every measurement")
+MEASURED: Final = {
+    "law alone": (),
+    "one measurement": (4,),
+    "two measurements": (4, 8),
+    "every measurement": range(1, 1 + round(LIFE_KM / EVERY_KM)),
+}
+"""Points after which the linings are measured, the fourth at 10,000 km."""
+MODES: Final = tuple(MEASURED)
 LAWS: Final = ("extended", "quasi-static")
 
 
@@ -158,7 +164,7 @@ def live(car: CarDrives, law_name: str, law: Law) -> Life:
             wear, deviation = _appraise(params, record)
             predicted[mode].append(wear)
             sigma[mode].append(deviation)
-            if mode == "every measurement" or (mode == "one measurement" and points == MEASURED_ONCE):
+            if points in MEASURED[mode]:
                 for i in range(4):
                     add_measurement(record[0]["wear"], i, float(seen[i]), GAUGE)
     return Life(
