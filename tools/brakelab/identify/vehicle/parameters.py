@@ -23,6 +23,7 @@ from ecu.settings.config import AIR_DENSITY, Config
 HALVED: Final = 0.5  # of the prior's standard deviation: a key is identified
 ROUGH: Final = 0.05  # relative standard deviation from which a value is called rough
 START_OFF: Final = 0.25  # relative, of START's lengths
+TYRE: Final = 0.02  # likewise, of a radius by the tyre's size: tread of 8 mm, pressure, make
 FARTHEST_FROM_START: Final = 3.0  # of START's standard deviations
 
 
@@ -105,6 +106,8 @@ def parameters_of(found: Identified, config: Config) -> list[Parameter]:
     ]
     if found.pairs:
         track, sigma = found.pairs.track
+        if not found.signals.speed:  # it is for START's tyres
+            sigma = float(np.hypot(sigma, TYRE * track))
         rows.append(_of_track(config, track, sigma, found.pairs.windows))
     else:
         rows.append(_of_track(config, config.vehicle.track, config.vehicle.track, 0))
