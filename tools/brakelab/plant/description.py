@@ -229,7 +229,7 @@ def read_file(path: Path, model: type[Model]) -> Model:
         raise PlantFileError(str(path), "not valid TOML", str(error)) from error
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(str(part + isinstance(part, int)) for part in first["loc"])  # the first is 1
+        place = ".".join(str(part + 1 if isinstance(part, int) else part) for part in first["loc"])
         raise PlantFileError(str(path), place, first["msg"]) from error
 
 
