@@ -7,9 +7,20 @@ import pytest
 
 from brakelab.simulation.closed_loop import Drive
 from brakelab.studies import lies_table
-from brakelab.studies.lies import CARS, INPUTS, ROADS, SPLIT_ACCEL, cells, lies, scenario
+from brakelab.studies.lies import (
+    ANALOGUE,
+    CARS,
+    INPUTS,
+    ROADS,
+    SLOW,
+    SPLIT_ACCEL,
+    cells,
+    lies,
+    ramps,
+    scenario,
+)
 from brakelab.studies.lies_cell import DECEL, Cell, judge
-from brakelab.studies.lies_table import driven, lie_tables, why
+from brakelab.studies.lies_table import drift_table, driven, lie_tables, why
 from ecu.contract.faults import ACCEL_IMPLAUSIBLE, IMPLAUSIBLE, MOTOR_SHORT, WHEEL_SLIPS, WORD
 from ecu.contract.records import FRAME, new_record
 from ecu.contract.signals import CORNERS
@@ -148,6 +159,18 @@ def test_the_page_counts_the_cells(monkeypatch: pytest.MonkeyPatch) -> None:
     assert alarms.rows == [("suv, straight, car 1", "–", "–")]
 
 
+def test_the_page_says_of_slow_drifts_when_they_are_named_and_what_they_cost() -> None:
+    """A drift downwards that costs 10 % and is named, one upwards that costs 20 % and is not."""
+    down, up = cell(share=0.9, lost=(1.0, 4.0), faults={OWN: 25.0}), cell(share=1.2, lost=(1.0, 4.0))
+    drifts = [down._replace(lie=lie) for lie in ramps(NAME[2], SLOW) if "-" in lie]
+    drifts += [up._replace(lie=lie) for lie in ramps(NAME[2], SLOW) if "+" in lie]
+    found = drift_table(drifts)
+    assert [row[:4] for row in found.rows] == [
+        (NAME[2], kind, "– / 5.0", "0.90–1.20") for kind in ("scale", "zero")
+    ]
+    assert {len(row) for row in found.rows} == {len(found.columns)} == {2 + len(SLOW)}
+
+
 def test_the_page_says_what_was_not_driven() -> None:
     left = [f"{car} {road}" for car in CARS for road in ROADS][1:]
     assert driven([cell()]) == f"1 lies; not driven: {', '.join(left)}."
@@ -159,6 +182,13 @@ def test_the_page_says_what_was_not_driven() -> None:
 def test_every_input_has_its_lies(name: str) -> None:
     assert lies(name)
     assert all(set(fault.signal) for fault in lies(name).values())
+
+
+@pytest.mark.parametrize("name", ANALOGUE)
+def test_every_input_drifts_slowly_both_ways(name: str) -> None:
+    rates = {fault.rate for fault in ramps(name, SLOW).values()}
+    assert len(rates) >= len(SLOW)
+    assert rates == {-rate for rate in rates}
 
 
 def test_an_axle_that_drives_on_a_split_spins_at_more() -> None:

@@ -16,7 +16,11 @@ from brakelab.studies.lies_cell import BEGIN, DECEL, Cell, judge
 from ecu.contract.signals import CORNERS, INPUT_SIGNALS
 from ecu.settings.config import Config
 
-BRAKINGS: Final = 12
+BRAKINGS, MANY = 12, 40
+"""Of a drive, and of one with a slow drift."""
+FAST: Final = (0.1, 0.5, 1.0, -0.1, -0.5, -1.0)  # %/s
+SLOW: Final = (0.005, 0.01, 0.02, 0.05, -0.005, -0.01, -0.02, -0.05)  # %/s
+SLOW_ON: Final = ("suv", "straight")
 CARS: Final = {"suv": False, "suv-blended": True, "sedan": False}
 """Configurations, and whether their motors brake."""
 ROADS: Final[dict[str, dict[str, object]]] = {
@@ -84,6 +88,18 @@ def _fault(signals: tuple[str, ...], kind: str, **keys: float) -> Fault:
     return Fault.model_validate({"kind": kind, "t": BEGIN, "signal": list(signals), **keys})
 
 
+def ramps(name: str, rates: tuple[float, ...]) -> dict[str, Fault]:
+    """Return the drifts of the scale and of the zero of an input of `ANALOGUE` at `rates` [%/s], by name."""
+    signals, typical, _ = ANALOGUE[name]
+    found = {}
+    for rate in rates:
+        relative = {"rate": 0.01 * rate, "limit": 0.5}
+        found[f"ramp {rate:+g} %/s"] = _fault(signals, "scale_drifting", **relative)
+        moved = {"rate": 0.01 * rate * typical, "limit": 0.5 * typical}
+        found[f"zero {rate:+g} %/s"] = _fault(signals, "drifting", **moved)
+    return found
+
+
 def lies(name: str) -> dict[str, Fault]:
     """Return the lies of an input of `INPUTS`, by name."""
     if name in FLAGS:
@@ -103,11 +119,7 @@ def lies(name: str) -> dict[str, Fault]:
     for percent in (5, -5, 20, -20):
         found[f"{percent:+d} %"] = _fault(signals, "scaled", amount=1.0 + 0.01 * percent)
         found[f"zero {percent:+d} %"] = _fault(signals, "biased", amount=0.01 * percent * typical)
-    for rate in (0.1, 0.5, 1.0, -0.1, -0.5, -1.0):
-        relative = {"rate": 0.01 * rate, "limit": 0.5}
-        found[f"ramp {rate:+g} %/s"] = _fault(signals, "scale_drifting", **relative)
-        moved = {"rate": 0.01 * rate * typical, "limit": 0.5 * typical}
-        found[f"zero {rate:+g} %/s"] = _fault(signals, "drifting", **moved)
+    found |= ramps(name, FAST)
     for delay in (0.05, 0.2):
         found[f"delay {1e3 * delay:g} ms"] = _fault(signals, "delayed", delay=delay)
     if name == "accumulator_pressure":
@@ -120,11 +132,11 @@ def lies(name: str) -> dict[str, Fault]:
 INPUTS: Final = (*ANALOGUE, *FLAGS, "accelerator_position")
 
 
-def scenario(car: str, road: str, fault: list[Fault]) -> Scenario:
+def scenario(car: str, road: str, fault: list[Fault], brakings: int = BRAKINGS) -> Scenario:
     """Return the drive of a car of `CARS` on a road of `ROADS`."""
     phases = [Phase(kind="coast", seconds=1.0)]
     accel = SPLIT_ACCEL if road == "split" else ACCEL
-    for _ in range(BRAKINGS):
+    for _ in range(brakings):
         phases += [
             Phase(kind="brake", decel=DECEL, until_speed=3.0),
             Phase(kind="cruise", speed=30.0, accel=accel, until_speed=28.0),
@@ -137,24 +149,32 @@ def scenario(car: str, road: str, fault: list[Fault]) -> Scenario:
     )
 
 
-def cells(car: str, road: str, name: str, seed: int, wanted: tuple[str, ...] = ()) -> list[Cell]:
-    """Drive every lie of an input (or the `wanted` ones) by a car drawn from `seed` on a road."""
+def cells(
+    car: str, road: str, name: str, seed: int, wanted: tuple[str, ...] = (), slow: bool = False
+) -> list[Cell]:
+    """Drive every lie of an input (or the `wanted` ones) by a car drawn from `seed` on a road.
+
+    `slow`: every slow drift instead, in a longer drive.
+    """
     config: Config = configured(car)
-    sound = run(new_loop(scenario(car, road, []), config, seed))
+    brakings = MANY if slow else BRAKINGS
+    sound = run(new_loop(scenario(car, road, [], brakings), config, seed))
     found = []
-    for lie, fault in lies(name).items():
+    for lie, fault in (ramps(name, SLOW) if slow else lies(name)).items():
         if wanted and lie not in wanted:
             continue
-        drive = run(new_loop(scenario(car, road, [fault]), config, seed), seconds=LONGER * sound.t[-1])
+        loop = new_loop(scenario(car, road, [fault], brakings), config, seed)
+        drive = run(loop, seconds=LONGER * sound.t[-1])
         found.append(judge((car, road, name, lie), drive, sound, config.vehicle.mass, tuple(fault.signal)))
     return found
 
 
-def _one(task: tuple[str, str, str, int]) -> list[Cell]:
+def _one(task: tuple[str, str, str, int, tuple[str, ...], bool]) -> list[Cell]:
     return cells(*task)
 
 
-def all_cells() -> list[Cell]:
-    """Drive every input by every car on every road, on all cores."""
-    tasks = [(*cell, 1) for cell in product(CARS, ROADS, INPUTS)]
+def all_cells(slow: bool = False) -> list[Cell]:
+    """Drive every input by every car on every road, on all cores; `slow`: slow drifts, on `SLOW_ON`."""
+    every = [(*SLOW_ON, name) for name in ANALOGUE] if slow else product(CARS, ROADS, INPUTS)
+    tasks = [(*cell, 1, (), slow) for cell in every]
     return [cell for found in run_each("lies", _one, tasks) for cell in found]

@@ -114,6 +114,24 @@ def _alarms(cells: list[Cell], cars: int) -> Table:
     return Table("False alarms of sound cars", ("drive", "hours", "inputs named"), rows, "")
 
 
+def drift_table(cells: list[Cell]) -> Table:
+    """Return the table of slow drifts: when each is named, and the force until and after that."""
+    found = {(cell.input, *cell.lie.split(maxsplit=1)): cell for cell in cells}
+    rates = [rate for rate in lies.SLOW if rate > 0.0]
+    rows = []
+    for name, kind in dict.fromkeys(key[:2] for key in found):
+        row = []
+        for rate in rates:
+            both = [found[name, kind, f"{sign * rate:+g} %/s"] for sign in (1.0, -1.0)]
+            least, most = min(c.least_long for c in both), max(c.most_long for c in both)
+            row += [" / ".join(_seconds(c.named_s) for c in both), f"{least:.2f}–{most:.2f}"]
+        rows.append((name, "scale" if kind == "ramp" else "zero", *row))
+    columns = [f"{rate:g} %/s: {what}" for rate in rates for what in ("named after [s]", "force")]
+    car, road = lies.SLOW_ON
+    title = f"Drifts that are slow: {car}, {road}, {lies.MANY} brakings"
+    return Table(title, ("input", "drift of", *columns), rows, "")
+
+
 def lie_tables(cells: list[Cell], cars: int) -> list[Table]:
     """Return the tables of the page; `cars`: sound ones that drive for false alarms."""
     roads = [f"{car}, {road}" for car in CARS for road in ROADS]
@@ -137,13 +155,16 @@ TEXT: Final = (
     "2 s after that began. Where a lie is worst, the friction that the ECU believes over the true one, "
     "and the motors' demand, are compared with the sound car's at the same time of that braking; faults are "
     "those that only the lie brings. Cars of the wide draw: lies by car 1, sound cars by the number in the "
-    "table. [faults.md](../faults.md) says what is left out, and by which witnesses."
+    "table. Of slow drifts the table has when the one upwards and the one downwards are named, and the force "
+    f"that both fall below or stay above for {LONG_S:g} s, the least and the greatest. "
+    "[faults.md](../faults.md) says what is left out, and by which witnesses."
 )
 
 
 def _run(asked: Asked) -> Measured:
     cells = lies.all_cells()
-    return Measured(lie_tables(cells, min(asked.seeds, SOUND)), f", {driven(cells).rstrip('.')}")
+    tables = [*lie_tables(cells, min(asked.seeds, SOUND)), drift_table(lies.all_cells(slow=True))]
+    return Measured(tables, f", {driven(cells).rstrip('.')}")
 
 
 STUDY: Final = Study("Inputs that lie", TEXT, _run)
