@@ -10,6 +10,7 @@ from ecu.algorithm.hydraulics import forget_lateness, learn_lateness
 from ecu.algorithm.inputs import LEAST_REQUEST, driver_accelerates, others_brake, requested_decel, usable
 from ecu.algorithm.monitoring.accel_error import (
     PROVEN_S,
+    STOOD_S,
     accel_doubted,
     accel_unknown,
     all_wheels_scaled,
@@ -36,7 +37,7 @@ from ecu.algorithm.monitoring.pressures import (
     lasting_difference,
     pressures_doubted,
 )
-from ecu.algorithm.monitoring.speeds import SPEED, watch_speeds
+from ecu.algorithm.monitoring.speeds import FOUND_S, SPEED, watch_speeds
 from ecu.algorithm.monitoring.turning import watch_turning
 from ecu.algorithm.monitoring.wheel_unit import watch_wheel_unit
 from ecu.algorithm.monitoring.witness import believe, leave_out, note_named, rejected_faults
@@ -90,6 +91,8 @@ def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
         compare_motors(p, s.motors, s.witness, u, s.blending, s.accel_error, dt)
         if s.application.duration_s > LET_GO_S and estimate.speed > LEAST_SPEED:
             deny_drive(p, s.motors, s.witness, u, dt)
+    if s.accel_error.stood_s > STOOD_S:
+        s.speeds.rolled_s = min(s.speeds.rolled_s, FOUND_S)  # who got in presses the tyres
     watch_speeds(p, s.speeds, s.witness, u, estimate, s.guard.acting != 0, dt)
     return faults
 

@@ -9,9 +9,10 @@ differ by while rolling:
     faster than it    while nothing drives it
 
 and where it is off by more than `SLID`, `SPIN_UP_S` later, so a wheel that slides or spins is never judged.
-Where the accelerometer confirms the vehicle speed and not the wheels together (`carried.py`), which slip does
-not explain, or no wheel is believed, the vehicle speed stands for the median; while it is confirmed it is not
-judged.
+Wheels that roll freely turn alike to within `ALIKE`, whatever the road. Where the accelerometer confirms the
+vehicle speed and not the wheels together (`carried.py`), which slip does not explain, or no wheel is
+believed, the vehicle speed stands for the median; while it is confirmed it is not judged. No wheel that is
+braked is faster than it, none that is driven slower: then they are judged as if they rolled.
 
 The vehicle speed is judged where it is slower than the wheels and nothing drives them, and where it is faster
 while they roll freely, or while dead reckoning agrees with them. A constant error of less than
@@ -78,6 +79,7 @@ SMOOTHING_S = 0.1
 TOLERANCE, UNFOUND = 0.035, 0.03  # of the speed, added before the radii are found
 ROLLING, ROLLING_ACROSS = 0.012, 0.002  # of the speed while rolling freely, by lateral acceleration [s^2/m]
 ABSOLUTE, LAG_S = 0.15, 0.3  # m/s; of a vehicle speed, while the car slows
+ALIKE, ALIKE_ACROSS, ALIKE_BY, ALIKE_S = 0.003, 0.005, 0.06, 1.0  # as these, of wheels beside wheels; s
 SLIPPING = 0.06  # added for a vehicle speed above wheels that are braked
 DOUBT_S = 0.3
 SPIN_UP_S = 0.5  # of a wheel that slid on ice: lag of the hydraulics, and 15 m/s^2 at an adhesion of 0.05
@@ -134,18 +136,18 @@ def _median(state: Record, witness: Record) -> float:
 
 
 @kernel
-def _may_slip(state: Record, braked: bool, drives: bool) -> bool:
-    """Return whether the wheels may have left the car by slip."""
+def _may_slip(state: Record, median: float, braked: bool, drives: bool) -> bool:
+    """Return whether the wheels may have left the car by slip: behind it if braked, ahead of it if driven."""
     for i in range(4):
         braked = braked or state.spins_s[i, 0] > 0.0
         drives = drives or state.spins_s[i, 1] > 0.0
-    behind = state.carried.behind[WHEELS]
-    slip: bool = (braked and behind < 0.0) or (drives and behind > 0.0)
+    behind, ahead = state.carried.behind[WHEELS], median - state.implied[SPEED]
+    slip: bool = (braked and max(behind, ahead) < 0.0) or (drives and min(behind, ahead) > 0.0)
     return slip
 
 
 @kernel
-def _over_ground_tells(state: Record, witness: Record, braked: bool, drives: bool) -> bool:
+def _over_ground_tells(state: Record, witness: Record, median: float, braked: bool, drives: bool) -> bool:
     """Return whether the vehicle speed stands for the wheels: it is confirmed, or no wheel is believed."""
     if not math.isfinite(state.implied[SPEED]) or witness.rejected[VEHICLE_SPEED]:
         return False
@@ -153,7 +155,7 @@ def _over_ground_tells(state: Record, witness: Record, braked: bool, drives: boo
     for i in range(4):
         if math.isfinite(state.implied[i]) and not witness.rejected[_place(i)]:
             wheels += 1
-    confirmed = over_ground_confirmed(state.carried) and not _may_slip(state, braked, drives)
+    confirmed = over_ground_confirmed(state.carried) and not _may_slip(state, median, braked, drives)
     return wheels == 0 or confirmed
 
 
@@ -277,17 +279,16 @@ def watch_speeds(
     _gather(params, state, inputs, estimate)
     median, accel = _median(state, witness), estimate.accel_x
     braked = accel < DRAGGED_ACCEL
-    for i in range(4):
-        state.torque[i] += (estimate.brake_torque[i] - state.torque[i]) * min(dt / SMOOTHING_S, 1.0)
-        braked = braked or state.torque[i] > TORQUE
     accelerates = driver_accelerates(inputs) or accel > DRIVEN_ACCEL
     drives = accelerates
     for i in range(4):
+        state.torque[i] += (estimate.brake_torque[i] - state.torque[i]) * min(dt / SMOOTHING_S, 1.0)
+        braked = braked or state.torque[i] > TORQUE
         drives = drives or motor_torque(inputs, i) < -TORQUE
     seen = estimate.measured != 0 and not estimate.backwards and dt < OVERSLEPT_S
     carry_speeds(params, state.carried, state.implied, accel, seen, dt)
-    if _over_ground_tells(state, witness, braked, drives):
-        median = state.implied[SPEED]
+    tells = _over_ground_tells(state, witness, median, braked, drives)
+    median = state.implied[SPEED] if tells else median
     known = state.reckoned if state.started else estimate.speed
     spin = drives and not braked and _wheels_spin(state, median, known)
     left = (braked and _wheels_left(state, median)) or (spin and state.started != 0)
@@ -307,16 +308,17 @@ def watch_speeds(
     state.left_s = SPIN_UP_S if left else max(state.left_s - dt, 0.0)
     free = free and state.left_s == 0.0
     for i in range(4):
-        torque = state.torque[i] + motor_torque(inputs, i)
-        free = free and abs(torque) < TORQUE
+        free = free and abs(state.torque[i] + motor_torque(inputs, i)) < TORQUE
     state.rolled_s = min(state.rolled_s + dt, BASE_S) if free else state.rolled_s
     found = state.rolled_s >= FOUND_S
     tolerance = TOLERANCE + ABSOLUTE / ground + (0.0 if found else UNFOUND)
+    rolling = ROLLING + ROLLING_ACROSS * abs(estimate.accel_y) + ABSOLUTE / ground
     if free and found:
-        tolerance = ROLLING + ROLLING_ACROSS * abs(estimate.accel_y)
-        tolerance += (ABSOLUTE + LAG_S * abs(accel)) / ground
-    lateness = state.lateness
-    slip, delay = tyre_slip(params, accel) * ground, reference_lag(lateness)
+        tolerance = rolling + LAG_S * abs(accel) / ground
+        if not tells and state.rolled_s > ALIKE_S:
+            rolling = ALIKE + ALIKE_ACROSS * abs(estimate.accel_y) + ALIKE_BY / ground
+    lateness, slip = state.lateness, tyre_slip(params, accel) * ground
+    delay = reference_lag(lateness)
     reckoned = 0.0 if state.implied[SPEED] < 0.5 * (ground + state.reckoned) else state.reckoned
     slides = guarded or state.left_s > 0.0 or reckoned > (1.0 + AWAY) * ground + slip
     shows = begin_lateness(lateness, _believed(state, witness), accel, estimate.accel_y, slides, dt)
@@ -329,8 +331,8 @@ def watch_speeds(
             follow_lag(lateness, i, above, accel, ground, dt)
         implied = state.implied[i] / (1.0 - state.base[i])
         state.apart[i] += (implied / ground - 1.0 - state.apart[i]) * min(dt / SMOOTHING_S, 1.0)
-        braking, motor = state.torque[i % 4], motor_torque(inputs, i % 4)
-        braked, driven = False, accelerates or motor < -TORQUE
+        braking, motor, braked = state.torque[i % 4], motor_torque(inputs, i % 4), False
+        driven = accelerates or motor < -TORQUE
         if i < SPEED:
             braked = braking + motor > TORQUE or accel < DRAGGED_ACCEL or state.left_s > 0.0
         apart = _judged(state, i, ground, free, braked, driven, drives)
@@ -339,9 +341,10 @@ def watch_speeds(
             apart = math.nan
         place = _place(i)
         unit = ground / params.wheel_radius[i] if i < SPEED else ground
+        lag = doubted_lag(lateness) * abs(accel) / ground if i == SPEED else 0.0
+        allowed = rolling if (tells or free) and found and i < SPEED else tolerance + lag
         if i == SPEED or not judge_lag(lateness, witness, i, place, unit / ground, dt):
-            lag = doubted_lag(lateness) * abs(accel) / ground if i == SPEED else 0.0
-            judge(witness, place, apart * unit, (tolerance + lag) * unit, DOUBT_S, dt)
-        if free and not witness.rejected[place] and abs(apart) < tolerance:
+            judge(witness, place, apart * unit, allowed * unit, DOUBT_S, dt)
+        if free and not witness.rejected[place] and abs(apart) < allowed:
             base = state.base[i] + (state.apart[i] - state.base[i]) * dt / max(state.rolled_s, dt)
             state.base[i] = min(max(base, -FARTHEST_BASE), FARTHEST_BASE)

@@ -1,12 +1,14 @@
-"""What the algorithm gets of its inputs: those that contradict others masked, replaced or corrected."""
+"""Cross-checks: what they hand on to each other, and inputs that are masked, replaced or corrected."""
 
 import math
 
 import numpy as np
 import pytest
 
+from ecu.algorithm.monitoring.accel_error import STOOD_S
 from ecu.algorithm.monitoring.lateness import WHEELS
-from ecu.algorithm.monitoring.sensors import mask_implausible
+from ecu.algorithm.monitoring.sensors import mask_implausible, watch_sensors
+from ecu.algorithm.monitoring.speeds import BASE_S, FOUND_S
 from ecu.algorithm.step import new_state
 from ecu.contract.faults import IMPLAUSIBLE
 from ecu.contract.signals import (
@@ -233,3 +235,13 @@ def test_a_motor_that_is_not_heard_gives_what_it_was_asked_for(
     assert inputs.inputs[0]["value"][MOTOR_TORQUE + RR] == torque, case
     assert inputs.inputs[0]["value"][MOTOR_TORQUE + FL] == 100.0
     assert [f"motor_torque_{CORNERS[RR]}"] == [n for n in INPUT if INPUT[n] == MOTOR_TORQUE + RR]
+
+
+@pytest.mark.parametrize(("stood_s", "rolled_s"), [(STOOD_S - 1.0, BASE_S), (STOOD_S + 1.0, FOUND_S)])
+def test_who_gets_in_while_the_car_stands_presses_its_tyres(params, feed, stood_s, rolled_s) -> None:
+    """The radii that were found are then less certain."""
+    state = new_state(params)[0]
+    state["estimate"]["started"] = state["estimate"]["torques_known"] = 1
+    state["accel_error"]["stood_s"], state["speeds"]["rolled_s"] = stood_s, BASE_S
+    watch_sensors(params[0], state, feed()[0], 0.01)
+    assert state["speeds"]["rolled_s"] == rolled_s
