@@ -1,18 +1,18 @@
 """Plausibility of wheel speeds and vehicle speed against each other and the accelerometer.
 
-Each wheel gives the car's speed at its radius, turning removed. With the vehicle speed and dead reckoning by
-the accelerometer, whose zero and slope are followed slowly, they form a median that two inputs of one frame
-cannot move. A wheel is judged by its low-passed difference from it, less what its radius has been found to
-differ by while rolling:
+Each wheel gives the car's speed at its radius, turning removed. With the vehicle speed they form a median
+that two inputs of one frame cannot move; where they are even in number, with dead reckoning too, whose zero
+and slope are followed slowly: wheels that were driven have drawn it along. A wheel is judged by its
+low-passed difference from the median, less what its radius has been found to differ by while rolling:
 
     slower than it    while nothing brakes that wheel: it rolls or is driven
     faster than it    while nothing drives it
 
 and where it is off by more than `SLID`, `SPIN_UP_S` later, so a wheel that slides or spins is never judged.
-Wheels that roll freely turn alike to within `ALIKE`, whatever the road. Where the accelerometer confirms the
-vehicle speed and not the wheels together (`carried.py`), which slip does not explain, or no wheel is
-believed, the vehicle speed stands for the median; while it is confirmed it is not judged. No wheel that is
-braked is faster than it, none that is driven slower: then they are judged as if they rolled.
+Wheels that roll freely turn alike to within `ALIKE`; the vehicle speed tells which do not. Where the
+accelerometer confirms it and not the wheels together (`carried.py`), which slip does not explain, or no wheel
+is believed, it stands for the median; while it is confirmed it is not judged. No wheel that is braked is
+faster than it, none that is driven slower: then they are judged as if they rolled.
 
 The vehicle speed is judged where it is slower than the wheels and nothing drives them, and where it is faster
 while they roll freely, or while dead reckoning agrees with them. A constant error of less than
@@ -123,9 +123,8 @@ def _median(state: Record, witness: Record) -> float:
     """Return the median of the witnesses that speak and are not rejected; NaN: fewer than three do."""
     count = 0
     for i in range(WITNESSES):
-        value = state.implied[i]
-        if math.isfinite(value) and (i == RECKONED or not witness.rejected[_place(i)]):
-            k = count
+        value, k = state.implied[i], count
+        if math.isfinite(value) and (count % 2 == 0 if i == RECKONED else not witness.rejected[_place(i)]):
             while k > 0 and state.sorted[k - 1] > value:
                 state.sorted[k] = state.sorted[k - 1]
                 k -= 1
@@ -315,7 +314,7 @@ def watch_speeds(
     rolling = ROLLING + ROLLING_ACROSS * abs(estimate.accel_y) + ABSOLUTE / ground
     if free and found:
         tolerance = rolling + LAG_S * abs(accel) / ground
-        if not tells and state.rolled_s > ALIKE_S:
+        if state.rolled_s > ALIKE_S and not tells and _believed(state, witness) >= 1 << SPEED:
             rolling = ALIKE + ALIKE_ACROSS * abs(estimate.accel_y) + ALIKE_BY / ground
     lateness, slip = state.lateness, tyre_slip(params, accel) * ground
     delay = reference_lag(lateness)

@@ -174,6 +174,22 @@ def test_without_a_speed_over_ground_the_accelerometer_sees_which_axle_lies(para
     assert road.drive(1.0, (1.2, 1.2, 0.98, 0.98, 1), -4.0) == FRONT
 
 
+@pytest.mark.parametrize(
+    ("turns", "rejected"), [((1.01, 1.01, 1, 1, 1), FRONT), ((1, 1, 1.01, 1.01, 1), REAR)]
+)
+def test_the_vehicle_speed_tells_which_axle_turns_otherwise(road, turns, rejected) -> None:
+    """Dead reckoning was drawn along by wheels that were driven: it accuses the other axle."""
+    road.speed = 10.0
+    assert road.drive(5.0, (1.02, 1.02, 1.02, 1.02, 1), 3.0, 40.0) == ()
+    assert road.drive(1.2, turns, -0.3) == rejected
+
+
+def test_without_a_speed_over_ground_nobody_knows_which_axle_turns_otherwise(params, feed) -> None:
+    road = Road(params, feed, reference=False)
+    road.drive(5.0)
+    assert road.drive(3.0, (1.01, 1.01, 1, 1, 1)) == ()
+
+
 def test_all_wheels_that_lied_are_believed_again_by_the_vehicle_speed(road) -> None:
     assert road.drive(3.0, (1.1, 1.1, 1.1, 1.1, 1)) == NAMES[:4]
     assert road.drive(1.5, (1, 1, 1, 1, 1)) == ()
