@@ -185,7 +185,7 @@ def test_every_input_has_its_lies(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ANALOGUE)
-def test_every_input_drifts_slowly_both_ways(name: str) -> None:
+def test_every_input_drifts_slowly_up_and_down(name: str) -> None:
     rates = {fault.rate for fault in ramps(name, SLOW).values()}
     assert len(rates) >= len(SLOW)
     assert rates == {-rate for rate in rates}
