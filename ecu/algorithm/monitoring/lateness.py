@@ -6,8 +6,9 @@ A reading that is late by L is too high by L d, whatever the speed is; slip, rad
 it. Each input has a Kalman filter of the two states, while the car brakes by more than `SLOWS`; q begins anew
 in every braking, and where an input is left out. The others are the fastest of median, dead reckoning and
 vehicle speed, and the slip of the configured tyre at this deceleration is allowed for: wheels that slip
-together make nobody late. Once a wheel slips by `SLIDES` more than that, or the slip guard acts, nothing is
-said until the next braking: what comes back from there looks late.
+together make nobody late. Once a wheel slips by `SLIDES` more than that, the slip guard acts, or the car
+brakes beyond `NEAR_LIMIT` of the road's ceiling, where one axle slips more than the other, nothing is said
+until the next braking: what comes back from there looks late.
 
 A vehicle speed may be late, as one by satellites is: it is not judged by that, its samples are older by L.
 
@@ -42,6 +43,7 @@ LAG_START, SHARE_START = 0.1, 0.005  # s, -: standard deviations
 WALK = 0.004  # s per root second
 NOISE = 0.25  # m/s of a cycle's reading
 SLIDES, LONGEST = 0.04, 0.35  # of the speed, s: what is beyond that is no lag
+NEAR_LIMIT = 0.8
 LATE, LATE_DOUBT, SIGMAS = 0.05, 0.03, 2.0  # s, s, -
 DOUBTED = 3.5  # standard deviations: of one that has not braked yet, `LONGEST`
 KNOWN = 0.1  # s of doubt, within which the vehicle speed says that wheels are late
@@ -58,7 +60,7 @@ def begin_lateness(state: Record, others: int, accel: float, across: float, slid
         others: mask of the inputs that are believed.
         accel: of the car [m/s^2].
         across: lateral acceleration [m/s^2].
-        slides: a wheel does.
+        slides: a wheel does, or may.
         dt: time since the last cycle [s].
     """
     slows = accel < -SLOWS

@@ -42,6 +42,7 @@ from ecu.algorithm.monitoring.carried import (
 from ecu.algorithm.monitoring.lateness import (
     KNOWN,
     LATENESS_STATE,
+    NEAR_LIMIT,
     begin_lateness,
     doubted_lag,
     follow_lag,
@@ -320,6 +321,7 @@ def watch_speeds(
     delay = reference_lag(lateness)
     reckoned = 0.0 if state.implied[SPEED] < 0.5 * (ground + state.reckoned) else state.reckoned
     slides = guarded or state.left_s > 0.0 or reckoned > (1.0 + AWAY) * ground + slip
+    slides = slides or -accel > NEAR_LIMIT * estimate.grip_limit
     shows = begin_lateness(lateness, _believed(state, witness), accel, estimate.accel_y, slides, dt)
     for i in range(5):
         if math.isnan(state.implied[i]):

@@ -1,5 +1,7 @@
 """Wheel speeds and vehicle speed: which of them contradicts the others, and when nothing is said."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -19,7 +21,7 @@ class Road:
         self.params, self.feed, self.inputs = params[0], feed, feed()
         self.state, self.witness = np.zeros(1, SPEEDS_STATE)[0], np.zeros(1, WITNESS_STATE)[0]
         self.estimate = np.zeros(1, ESTIMATE)[0]
-        self.estimate["measured"] = 1
+        self.estimate["measured"], self.estimate["grip_limit"] = 1, math.nan
         self.speed, self.reference, self.noise = 25.0, reference, 0.0  # m/s, -, N m
         self.random = np.random.default_rng(0)
 
@@ -296,6 +298,19 @@ def test_a_wheel_that_comes_back_from_a_slip_is_not_late(road, guarded: bool) ->
     for slip in np.linspace(slid, 0.0, 30):
         road.drive(0.1, (1 - slip, 0.98, 0.98, 0.98, 1), -4.0, guarded=guarded)
         assert road.drive(0.0) == ()
+
+
+@pytest.mark.parametrize(("limit", "late"), [(math.nan, REAR), (9.0, REAR), (6.8, ())])
+def test_near_the_limit_of_grip_an_axle_that_slips_less_is_not_late(params, feed, limit, late) -> None:
+    """The front comes to slip by 5 %, the rear to 3 %, and dead reckoning is as far behind the car."""
+    road = Road(params, feed, reference=False)
+    road.speed = 33.0
+    assert road.drive(5.0) == ()
+    road.estimate["grip_limit"], road.state["reckoned"] = limit, 0.95 * road.speed
+    for slip in np.minimum(np.linspace(0.15, 6.75, 45), 1.0):
+        front, rear = 1.0 - 0.055 * slip, 1.0 - 0.03 * slip
+        named = road.drive(0.1, (front, front, rear, rear, 1), -6.2)
+    assert named == late
 
 
 def test_pressures_noise_brakes_no_wheel(road) -> None:
