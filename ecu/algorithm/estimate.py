@@ -34,6 +34,7 @@ ESTIMATE = np.dtype(
         ("grip_limit", "f8"),  # ceiling of the brakes' deceleration [m/s^2]; NaN: unknown
         ("sigma_grip_limit", "f8"),  # m/s^2
         ("grip_knee", "f8"),  # exponent of the bend towards it; NaN: the ECU brakes
+        ("grip_fall", "f8"),  # share of the grip that is lost beyond it; NaN: likewise
         ("torque_share", "f8"),  # of reported motor torques that counts, by how the car is driven
         ("torques_known", "u1"),  # those of drive and of each brake are known
         # The wheels.

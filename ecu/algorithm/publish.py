@@ -57,7 +57,7 @@ def publish(p: Record, s: Record, u: Record, y: Record, decel: float, faults: in
     y.accel_x_model = e.accel_x_model
     y.overrun, y.accel_x_zero, y.vehicle_mass = e.overrun, e.accel_bias, e.mass
     y.sigma_brake_force, y.sigma_overrun = e.sigma_force, e.sigma_overrun
-    y.overrun_power = e.overrun_power
+    y.overrun_power, y.grip_fall = e.overrun_power, e.grip_fall
     y.grip_limit, y.sigma_grip_limit, y.grip_knee = e.grip_limit, e.sigma_grip_limit, e.grip_knee
     y.motor_torque_share = e.torque_share
     y.pressure_lateness_rise = lateness(p, s.hydraulics, RISE)

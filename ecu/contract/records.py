@@ -146,8 +146,8 @@ LEARNED: Final = np.dtype(
         ("joint_covariance", "f8", (N_KEPT * (N_KEPT + 1) // 2,)),  # covariance, lower triangle by rows
         ("joint_known", "u1"),  # 0: nothing learned yet
         ("spare", "u1", (7,)),  # a gap would be left undefined by copies, and the bytes are compared
-        ("whole", "f8", (5,)),  # states learned from whole applications, see its module
-        ("whole_covariance", "f8", (15,)),  # lower triangle by rows; 0: nothing learned yet
+        ("whole", "f8", (6,)),  # states learned from whole applications, see its module
+        ("whole_covariance", "f8", (21,)),  # lower triangle by rows; 0: nothing learned yet
         ("disc_excess", "f8", (4,)),  # greatest excess over the air left by the last application [K]
         ("brakings", "i8"),  # brake applications since the record was first made
         ("wear", WEAR),

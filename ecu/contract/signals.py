@@ -182,6 +182,9 @@ OUTPUT_SIGNALS: Final[tuple[OutputSignal, ...]] = (
     OutputSignal("pressure_lateness_fall", "s", False, "", "likewise, of falling ones"),
     OutputSignal("sigma_overrun", "m/s^2", False, "", "its standard deviation, with the noise of a mean"),
     OutputSignal("overrun_power", "W/kg", False, "", "drag of constant power beyond that at 10 m/s"),
+    OutputSignal(
+        "grip_fall", "-", False, "", "share of the grip lost beyond the limit; null where the ECU brakes"
+    ),
 )
 
 DEMANDS: Final = {

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from ecu.algorithm.control.distribution import front_share
-from ecu.algorithm.estimation.joint.whole_filter import CEILING, GRIP
+from ecu.algorithm.estimation.joint.whole_filter import CEILING, FALL, GRIP
 from ecu.contract.params import BAR, GRAVITY
 from ecu.contract.records import RecordArray
 from ecu.output import fault, give
@@ -133,7 +133,8 @@ def learned_grip(params: Any, found: tuple[int, RecordArray] | None) -> str:
     variance = float(found[1]["whole_covariance"][0, place]) if found else 0.0
     if found is None or variance == 0.0:
         return "grip          no ceiling learned: only a car that others brake keeps one"
-    ceiling = CEILING * float(np.exp(found[1]["whole"][0, GRIP]))
+    learned = found[1]["whole"][0]
+    ceiling = CEILING * float(np.exp(learned[GRIP]) * (1.0 - learned[FALL]))
     most = float(params["pedal_decel"][-1])
     travel = float(np.interp(ceiling, params["pedal_decel"], params["pedal_position"]))
     return (

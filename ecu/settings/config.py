@@ -168,7 +168,7 @@ def store_key(config: Config) -> str:
     apart = {"pad", "dust", *(name for name in Axle.model_fields if "disc_" in name)}
     axles = [axle.model_dump(exclude=apart) for axle in (config.front, config.rear)]
     brakes = json.dumps(axles, sort_keys=True)
-    return f"{config.name}/{hashlib.sha256(brakes.encode()).hexdigest()[:8]}/7"
+    return f"{config.name}/{hashlib.sha256(brakes.encode()).hexdigest()[:8]}/8"
 
 
 def new_params(config: Config) -> RecordArray:

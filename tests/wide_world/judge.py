@@ -27,7 +27,7 @@ import numpy as np
 
 from brakelab.api import Result, replay
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, Line, Panel, write_chart
-from brakelab.results.prediction import power_drag
+from brakelab.results.prediction import bent, power_drag
 
 from .brakings import Braking, Signals, find, lining_decel, read, rest_decel
 from .config import Nominal
@@ -80,7 +80,7 @@ def published(result: Result, signals: Signals, brakings: list[Braking], nominal
         here = signals._replace(pressure=signals.pressure + offset)
         each = lining_decel(here, braking.rows, nominal, mu, mass)
         if np.isfinite(knee):
-            each = each * (1.0 + (each / result["grip_limit"][row]) ** knee) ** (-1.0 / knee)
+            each = bent(each, result["grip_limit"][row], knee, result["grip_fall"][row])
         lining = float(np.mean(each))
         known = signals._replace(motor=signals.motor * result["motor_torque_share"][row])
         rest = rest_decel(known, braking.rows, nominal, mass)

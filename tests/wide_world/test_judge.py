@@ -24,7 +24,7 @@ def result(**columns: float) -> dict[str, np.ndarray]:
         for name, value in (("pressure_zero", 0.7), ("sigma_mu_b", 0.04))
         for corner in CORNERS
     }
-    given |= {"grip_limit": np.nan, "grip_knee": np.nan, "motor_torque_share": 1.0}
+    given |= {"grip_limit": np.nan, "grip_knee": np.nan, "grip_fall": 0.0, "motor_torque_share": 1.0}
     given |= {"vehicle_mass": 1200.0, "accel_x_zero": 0.0, "sigma_brake_force": 0.1}
     given |= {"overrun": 0.0, "overrun_power": 0.0} | columns
     later = np.where(np.arange(len(t)) >= 300, 2.0, 1.0)
@@ -40,6 +40,11 @@ def result(**columns: float) -> dict[str, np.ndarray]:
         ({"accel_x_zero": 0.2}, 1.0, -0.2 / (1.0 + G * 0.002)),
         ({f"mu_b_{corner}": 0.3 for corner in CORNERS}, None, 0.0),
         ({"grip_limit": 2.9, "grip_knee": 2.5}, "bent", 0.0),
+        (
+            {"grip_limit": 0.45, "grip_knee": 3.0, "grip_fall": 0.2},
+            0.4 / 4.617,
+            0.0,
+        ),  # of a peak of 0.5 m/s^2
         ({f"pressure_zero_{corner}": 2.65 for corner in CORNERS}, 0.9, 0.0),  # 17.55 of 19.5 bar
     ],
 )

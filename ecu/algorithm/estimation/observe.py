@@ -129,7 +129,8 @@ def observe(
     tell_motion(s.motion, e)
     for i in range(4):
         e.load[i], e.brake_torque[i] = s.wheel_load.load[i], s.friction.torque[i]
-    e.grip_limit = e.sigma_grip_limit = e.grip_knee = e.sigma_overrun = e.overrun_power = math.nan
+    e.grip_limit = e.sigma_grip_limit = e.grip_knee = e.grip_fall = math.nan
+    e.sigma_overrun = e.overrun_power = math.nan
     e.torque_share, e.torques_known = 1.0, 1
     if p.observer == JOINT:
         _observe_jointly(p, s, u, heat, guarded, contradicted, braking, dt)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from brakelab.replay.earlier_layout import convert_initial
+from ecu.algorithm.estimation.joint.whole_filter import FALL, PRIOR
 from ecu.algorithm.step import INITIAL, initial_part, new_state
 from ecu.contract.records import RecordArray
 from ecu.settings.config import load_config, new_params
@@ -34,6 +35,13 @@ def earlier(without: str = "") -> np.dtype:
             shorter = {"whole": ("f8", (3,)), "whole_covariance": ("f8", (6,))}
             fields = [(field, *shorter.get(field, (part[field],))) for field in part.names]
             part = np.dtype(fields, align=True)
+        if name == "whole":
+            sizes = {"value": (5,), "covariance": (5, 5), "h": (5,), "ph": (5,)}
+            of_filter = part["filter"]
+            fewer = np.dtype(
+                [(field, of_filter[field].base, sizes.get(field, ())) for field in of_filter.names]
+            )
+            part = np.dtype([(field, fewer if field == "filter" else part[field]) for field in part.names])
         if name in ("flags", "witness"):
             continue
         parts.append(("friction_torque" if name == "hydraulics" else name, part))
@@ -50,13 +58,16 @@ def test_every_state_goes_on_under_its_present_name() -> None:
     old["joint"]["x"], old["joint"]["zero"]["value"] = np.arange(old["joint"]["x"].shape[1]), 0.7
     old["learned"] = np.frombuffer(bytes(range(1, 256)) * 40, old["learned"].dtype, 1)
     old["learned"]["whole_covariance"] = np.arange(6.0)
+    old["whole"]["filter"]["covariance"] = 0.3
     new = convert_initial(old, started())
     assert new.dtype == INITIAL
     assert new["hydraulics"]["value"].tolist() == [[1.0, 2.0, 3.0, 4.0]]
     assert new["hydraulics"]["agreed_s"].tolist() == [[0.5] * 4]
     assert new["joint"]["zero"]["value"].tolist() == [[0.7] * 4]
     np.testing.assert_array_equal(new["joint"]["x"], old["joint"]["x"])
-    assert new["learned"]["whole_covariance"].tolist() == [[*range(6), *[0.0] * 9]]
+    assert new["learned"]["whole_covariance"].tolist() == [[*range(6), *[0.0] * 15]]
+    assert (new["whole"]["filter"]["covariance"][0, :5, :5] == 0.3).all()
+    assert new["whole"]["filter"]["covariance"][0, 5].tolist() == [0.0] * 5 + [PRIOR[FALL] ** 2]
     alike = [name for name in old["learned"].dtype.names if not name.startswith("whole")]
     assert all(new["learned"][name].tobytes() == old["learned"][name].tobytes() for name in alike)
     assert (new["distribution"]["rolled"] == 1.0).all()

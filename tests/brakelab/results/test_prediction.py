@@ -96,6 +96,12 @@ def power(rows: np.ndarray) -> None:
     column(rows, "overrun_power")[:] = 5.0
 
 
+def slide(rows: np.ndarray) -> None:
+    """Let a road of ice give 5 mm/s^2 at most, and a fifth less to wheels that slide."""
+    column(rows, "grip_limit")[:], column(rows, "grip_knee")[:] = 0.0045, 3.0
+    column(rows, "grip_fall")[:], column(rows, "motor_torque_share")[:] = 0.2, 1.0
+
+
 POWER = float(np.mean(5.0 / SPEEDS - 5.0 / USUAL_SPEED))
 MOTORS = float((150.0 / P["wheel_radius"]).sum() / INERT)
 REST = RESISTANCE + ROLLING
@@ -117,6 +123,7 @@ REST = RESISTANCE + ROLLING
         pytest.param(pressure_zero, linings(pressure=39.4) + REST, REST, id="pressure sensors 0.6 bar off"),
         pytest.param(overrun, linings() + REST + 0.25, REST + 0.25, id="overrun of a drive"),
         pytest.param(power, linings() + REST + POWER, REST + POWER, id="a drive of constant power"),
+        pytest.param(slide, 0.004 + REST, REST, id="wheels slide"),
     ],
 )
 def test_what_is_expected_of_a_braking(change: Change, force: float, rest: float) -> None:

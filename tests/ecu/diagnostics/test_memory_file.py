@@ -20,7 +20,7 @@ from ecu.diagnostics.memory_file import FILE, Kept, MemoryFile, Place, from_reco
 from ecu.diagnostics.trouble_codes import TROUBLE_CODES
 from ecu.recording import revisions
 
-KEY = "suv/12345678/7"
+KEY = "suv/12345678/8"
 PLACE = Place(1_700_000_000_000_000_000, 4711)
 
 
@@ -59,7 +59,7 @@ def test_what_is_saved_is_loaded_by_the_next(tmp_path, file):
 def test_another_vehicles_memory_is_its_own(tmp_path, file):
     assert saved(file)
     file.close(10)
-    assert MemoryFile(tmp_path, "sedan/12345678/7").load() is None
+    assert MemoryFile(tmp_path, "sedan/12345678/8").load() is None
 
 
 def test_a_code_that_is_no_more_is_left_out():

@@ -17,7 +17,7 @@ from ecu.settings.resources import resource
 from ..watch.conftest import MONO_NS, START_NS
 
 ABOUT = {
-    "store_key": "suv/12345678/7",
+    "store_key": "suv/12345678/8",
     "versions": {"brake-ecu": "1.2.3"},
     "config_hash": "0123456789abcdef",
     "armed": True,

@@ -10,7 +10,7 @@ import pytest
 
 from ecu import cli
 from ecu.algorithm.control.distribution import front_share
-from ecu.algorithm.estimation.joint.whole_filter import CEILING, GRIP
+from ecu.algorithm.estimation.joint.whole_filter import CEILING, FALL, GRIP
 from ecu.algorithm.step import new_state
 from ecu.recording.store import open_store, save
 from ecu.settings.check import axle_torque_per_bar, figures, grip, held_demand, pressures
@@ -132,8 +132,8 @@ def test_a_learned_ceiling_is_compared_with_the_pedal(
     """suv: 80 % of the pedal asks for 6.6 m/s^2, 100 % for 10."""
     config = load_config(CONFIGS / "suv.toml")
     learned = new_state(new_params(config))["learned"].copy()
-    learned["whole"][0, GRIP] = math.log(7.0 / CEILING)
-    learned["whole_covariance"][0] = np.diag([0.01, variance, 0.01, 0.1, 1.0])[np.tril_indices(5)]
+    learned["whole"][0, GRIP], learned["whole"][0, FALL] = math.log(10.0 / CEILING), 0.3
+    learned["whole_covariance"][0] = np.diag([0.01, variance, 0.01, 0.1, 1.0, 0.04])[np.tril_indices(6)]
     with closing(open_store(tmp_path)) as store:
         save(store, store_key(config), learned)
     assert cli.main(["config", "check", str(CONFIGS / "suv.toml"), "--state", str(tmp_path)]) == 0

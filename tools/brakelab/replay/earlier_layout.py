@@ -7,7 +7,7 @@ from ecu.contract.records import RecordArray
 
 RENAMED = {"hydraulics": "friction_torque"}  # present name: earlier one
 # Hold what an earlier version had of them first, and are unknown beyond.
-GROWN = {"whole", "whole_covariance"}
+GROWN = {"whole", "whole_covariance", "value", "covariance", "h", "ph"}
 # Begin as in a new state.
 ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"} | {
     *("pressures", "flags", "accel_error", "witness", "motors", "turning", "speeds", "wheel_unit"),
@@ -46,6 +46,7 @@ ADDED = {"follows", "gain_variance", "shown", "automated", "gap_s", "published"}
         "filter",
         "coasting_s",
         "by_power",
+        "by_fall",
         "differs",
         "wheel_ratio",
         "speed_copies",
@@ -136,8 +137,9 @@ def _copy(source: RecordArray, target: RecordArray) -> bool:
             if not source.dtype[earlier].names or not _copy(source[earlier], target[name]):
                 return False
         elif name in GROWN:
-            first = source[earlier].shape[-1]
-            target[name][..., :first] = source[earlier][..., : target[name].shape[-1]]
+            both = zip(source[earlier].shape, target[name].shape, strict=True)
+            held = tuple(slice(min(sizes)) for sizes in both)
+            target[name][held] = source[earlier][held]
         elif source.dtype[earlier] != target.dtype[name]:
             return False
         else:

@@ -7,7 +7,8 @@ Without a friction sensor an estimate can only be judged by its prediction:
 
 mu_i, mass m, overrun (unreported engine drag) and the pressure zeros z_i are those known before the
 application; pressures p_i, motor torques M_i (positive brakes) and the speed v are its own, I_i is a wheel's
-inertia. f is a specific force, the reading of an accelerometer, so it is free of slope.
+inertia. f is a specific force, the reading of an accelerometer, so it is free of slope. In a car that others
+brake the linings' part is what road and tyres give of it (`bent`).
 
     specific_force_predicted   mean of f            over the rows in which the vehicle moves and the driver
     specific_force_mean        mean of b - a_x      does not drive against the brakes
@@ -81,6 +82,20 @@ def power_drag(speed: Vector) -> Vector:
     return np.asarray(1.0 / np.maximum(speed, FULL_TORQUE) - 1.0 / USUAL_SPEED)
 
 
+def bent(linings: Vector, limit: float, knee: float, fall: float) -> Vector:
+    """Return what road and tyres give of the linings' deceleration [m/s^2].
+
+    Args:
+        linings: deceleration that they ask for [m/s^2].
+        limit: `grip_limit` [m/s^2], midway between the peak and what is left beyond it.
+        knee: `grip_knee`.
+        fall: `grip_fall`.
+    """
+    asked = (linings * (1.0 - 0.5 * fall) / limit) ** knee
+    left = 1.0 - fall * asked**3 / (1.0 + asked**3)
+    return np.asarray(linings * (1.0 + asked) ** (-1.0 / knee) * left)
+
+
 def _motor_torques(rows: Vector) -> Vector:
     return np.nan_to_num(rows[:, N_OUTPUTS : N_OUTPUTS + 4])
 
@@ -124,6 +139,7 @@ class _Car(NamedTuple):
     power: float = 0.0  # of the unreported drag, over mass [W/kg]
     ceiling: float = float("inf")  # m/s^2, towards which the linings' deceleration bends
     knee: float = 1.0  # exponent of that bend
+    fall: float = 0.0  # share lost beyond it
     motors: float = 1.0  # share of the reported torques that counts
 
 
@@ -135,7 +151,7 @@ def _forces(rows: Vector, before: Vector, car: _Car, params: RecordArray) -> tup
     resistance = p["drag_area"] * rows[:, OUTPUT["vehicle_speed"]] ** 2
     resistance += p["rolling_resistance"] * GRAVITY * car.mass
     linings = _linings(rows, before, params) @ car.mu_b / inert
-    linings = linings * (1.0 + (linings / car.ceiling) ** car.knee) ** (-1.0 / car.knee)
+    linings = bent(linings, car.ceiling, car.knee, car.fall)
     power = car.power * power_drag(rows[:, OUTPUT["vehicle_speed"]])
     return linings, (motors + resistance) / inert + car.overrun + power
 
@@ -154,8 +170,10 @@ def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
     power = float(np.nan_to_num(before[OUTPUT["overrun_power"]]))
     learned = _Car(corners(before, "mu_b"), mass, overrun, power)
     if np.isfinite(before[OUTPUT["grip_knee"]]):
-        ceiling, knee = float(before[OUTPUT["grip_limit"]]), float(before[OUTPUT["grip_knee"]])
-        learned = learned._replace(ceiling=ceiling, knee=knee, motors=before[OUTPUT["motor_torque_share"]])
+        grip = (float(np.nan_to_num(before[OUTPUT[f"grip_{name}"]])) for name in ("limit", "knee", "fall"))
+        ceiling, knee, fall = grip
+        motors = before[OUTPUT["motor_torque_share"]]
+        learned = learned._replace(ceiling=ceiling, knee=knee, fall=fall, motors=motors)
     configured = _Car(p["mu_nominal"], float(p["mass"]), 0.0)
     speed = rows[:, OUTPUT["vehicle_speed"]]
     decel = mean(np.where(speed > STANDING, sum(_forces(rows, before, learned, params)), 0.0))

@@ -29,8 +29,8 @@ from ecu.algorithm.estimation.joint.wheel import (
 from ecu.algorithm.estimation.joint.whole_filter import (
     BESIDE,
     BESIDE_DRAG,
+    FALL,
     FILTER_STATE,
-    GRIP,
     KNEE,
     NOISE,
     OVERRUN,
@@ -42,6 +42,7 @@ from ecu.algorithm.estimation.joint.whole_filter import (
     correct_by_coasting,
     correct_by_mean,
     per_power,
+    published_ceiling,
     restore_filter,
     variance_of_mean,
 )
@@ -84,6 +85,7 @@ WHOLE_STATE = np.dtype(
         ("by_scale", "f8"),  # derivatives of `expected`
         ("by_grip", "f8"),
         ("by_power", "f8"),
+        ("by_fall", "f8"),
         ("usual", "f8"),  # s L of the last application whose linings taught [m/s^2]
         ("driven", "f8"),  # fading integral of the squared deceleration by reported torques [m^2/s^3]
         ("arrived", "f8"),  # likewise of it times that of the car
@@ -153,7 +155,7 @@ def begin_whole(params: Record, state: Record, joint: Record) -> None:
 @kernel
 def _open_mean(state: Record) -> None:
     state.time = state.measured = state.expected = state.linings = state.total = 0.0
-    state.by_scale = state.by_grip = state.by_power = 0.0
+    state.by_scale = state.by_grip = state.by_power = state.by_fall = 0.0
 
 
 @kernel
@@ -194,7 +196,7 @@ def add_to_whole(params: Record, state: Record, joint: Record) -> None:
     mass = _mass(params, state, joint)
     linings = math.exp(state.filter.value[SCALE]) * _lining_decel(params, joint, mass)
     ceiling = ceiling_of(state.filter)
-    expected, by_scale, by_grip = bend(linings, ceiling)
+    expected, by_scale, by_grip, by_fall = bend(linings, ceiling, state.filter.value[FALL])
     state.bent = 1 if linings > BENDS * ceiling else 0
     state.time += step
     state.measured -= step * other_decel(params, joint, mass, share)
@@ -206,6 +208,7 @@ def add_to_whole(params: Record, state: Record, joint: Record) -> None:
     state.by_scale += step * by_scale
     state.by_grip += step * by_grip
     state.by_power += step * per_power(joint.x[V])
+    state.by_fall += step * by_fall
 
 
 @kernel
@@ -223,6 +226,7 @@ def end_whole(state: Record) -> None:
         state.by_scale / state.time,
         state.by_grip / state.time,
         state.by_power / state.time,
+        state.by_fall / state.time,
         state.alone != 0,
     )
     if linings:
@@ -267,7 +271,7 @@ def tell_whole(params: Record, state: Record, joint: Record, estimate: Record) -
     """
     if state.alone and joint.closed:
         _compare_linings(params, state, joint)
-    ceiling, x, p = ceiling_of(state.filter), state.filter.value, state.filter.covariance
+    x, p = state.filter.value, state.filter.covariance
     scale, variance = math.exp(x[SCALE]), p[SCALE, SCALE]
     if not state.alone:
         variance = min(variance, BESIDE**2)
@@ -275,8 +279,8 @@ def tell_whole(params: Record, state: Record, joint: Record, estimate: Record) -
         own = state.unshown[i] if state.alone else (estimate.sigma[i] / estimate.mu[i]) ** 2
         estimate.mu[i] *= scale
         estimate.sigma[i] = estimate.mu[i] * math.sqrt(own + variance)
-    expected, by_scale, by_grip = bend(state.usual, ceiling)
-    variance = variance_of_mean(state.filter, expected, by_scale, by_grip)
+    expected, by_scale, by_grip, by_fall = bend(state.usual, ceiling_of(state.filter), x[FALL])
+    variance = variance_of_mean(state.filter, expected, by_scale, by_grip, by_fall)
     if not state.alone:
         variance += (by_scale * estimate.sigma_force) ** 2
     estimate.sigma_force = math.sqrt(variance) / expected
@@ -289,7 +293,7 @@ def tell_whole(params: Record, state: Record, joint: Record, estimate: Record) -
     if state.alone:
         estimate.accel_bias, estimate.mass = 0.0, params.mass
     estimate.torque_share = torque_share(state)
-    estimate.grip_limit, estimate.grip_knee = ceiling, KNEE
-    estimate.sigma_grip_limit = ceiling * math.sqrt(p[GRIP, GRIP])
+    estimate.grip_limit, estimate.sigma_grip_limit = published_ceiling(state.filter)
+    estimate.grip_knee, estimate.grip_fall = KNEE, x[FALL]
     if state.filter.at_bound:
         estimate.at_bound = 1

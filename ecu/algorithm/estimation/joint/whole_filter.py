@@ -1,14 +1,17 @@
 """Filter of a car that others brake: friction, ceiling of grip and unreported drag, by means of applications.
 
-    f = L' (1 + (L' / c)^n)^(-1/n) + o + P (1/v - 1/V)        L' = s L
+    f = L' (1 + (L' / c)^n)^(-1/n) (1 - h g) + o + P (1/v - 1/V)        L' = s L
+    g = (L' / c)^3n / (1 + (L' / c)^3n)
 
 L is the deceleration that the linings would give, f the specific force less drag, rolling and reported
-torques. The bend stands for wheels that reach their limit one after the other, and for a control that reports
-nothing. States are the logarithm of s, that of the ceiling c over `CEILING`, and drag that nobody reports by
-its signatures: o is the same at every speed and contains the accelerometer's zero; P is a constant power, of
-motors at their limit or of an engine that gears keep at its speed, v no less than `FULL_TORQUE`, where gears
-and power end; and of o the part d that comes and goes with the brake pedal. Where neither pedal is pressed
-the car shows o - d + P (1/v - 1/V), so the engine of the next application is known before it.
+torques. The bend stands for wheels that reach their limit one after the other. Beyond it tyres slide, and
+what eases the brakes, a control that reports nothing or a driver's foot, holds them below their limit: the
+share h is lost, which a ceiling alone would take for a poorer road. States are the logarithm of s, that of
+the ceiling c over `CEILING`, h, and drag that nobody reports by its signatures: o is the same at every speed
+and contains the accelerometer's zero; P is a constant power, of motors at their limit or of an engine that
+gears keep at its speed, v no less than `FULL_TORQUE`, where gears and power end; and of o the part d that
+comes and goes with the brake pedal. Where neither pedal is pressed the car shows o - d + P (1/v - 1/V), so
+the engine of the next application is known before it.
 
 An extended Kalman filter. An innovation beyond `GATE` standard deviations counts with a variance that puts it
 there. The law is not quite the car's: the error of a mean is a share of it, and what the drive does unseen.
@@ -23,22 +26,23 @@ import numpy as np
 
 from ecu.jit import Record, kernel
 
-SCALE, GRIP, OVERRUN, PEDAL, POWER = range(5)
-STATES = 5
+SCALE, GRIP, OVERRUN, PEDAL, POWER, FALL = range(6)
+STATES = 6
 CEILING = 14.0  # m/s^2: a first braking at 12 must be possible before any was seen
 FULL_TORQUE, USUAL_SPEED = 7.0, 10.0  # m/s, below which power falls with speed; V
-PRIOR_MEAN = np.array([0.0, 0.0, 0.2, 0.0, 0.0])  # the drags in m/s^2, the power in W/kg
-PRIOR = np.array([0.25, 0.5, 0.5, 0.5, 3.0])  # standard deviations: an engine drags by 0.1 to 1 m/s^2
-STEP = np.array([0.04, 0.03, 0.05, 0.1, 0.1])  # between applications, of a car with the usual noise
+# The drags in m/s^2, the power in W/kg; of sliding tyres' grip a tenth to a quarter is lost.
+PRIOR_MEAN = np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.2])
+PRIOR = np.array([0.3, 0.5, 0.65, 0.5, 3.0, 0.2])  # standard deviations: an engine drags by 0.1 to 1 m/s^2
+STEP = np.array([0.04, 0.03, 0.05, 0.1, 0.1, 0.02])  # between applications, of a car with the usual noise
 # Priors of scale, drag [m/s^2] and power [W/kg] beside windows, which teach nearly all; their step.
 BESIDE, BESIDE_DRAG, BESIDE_POWER, BESIDE_STEP = 0.03, 0.05, 0.5, 0.006
 # Of unknown length: rain, another road, another day; a full battery blends less.
-PAUSE = np.array([0.03, 0.15, 0.1, 0.3, 1.0])
-LOWEST_STATE = np.array([-0.7, math.log(3.0 / CEILING), -1.0, 0.0, -20.0])
+PAUSE = np.array([0.03, 0.15, 0.1, 0.3, 1.0, 0.05])
+LOWEST_STATE = np.array([-0.8, math.log(3.0 / CEILING), -1.0, 0.0, -20.0, 0.0])
 # Motors with the accelerator released brake by 2.5 m/s^2, blended ones take 30 kW of a car of 1.5 t.
-HIGHEST_STATE = np.array([0.6, math.log(30.0 / CEILING), 2.5, 2.5, 20.0])
-NOISE, NOISE_SHARE = 0.2, 0.07  # m/s^2, of the mean of an application, and of the linings' part of it
-COASTING_NOISE, COASTING_WALK = 0.25, 0.1  # m/s^2, of a second without a pedal; of the drag, per root second
+HIGHEST_STATE = np.array([0.8, math.log(30.0 / CEILING), 2.5, 2.5, 20.0, 0.7])
+NOISE, NOISE_SHARE = 0.15, 0.09  # m/s^2, of the mean of an application, and of the linings' part of it
+COASTING_NOISE, COASTING_WALK = 0.25, 0.05  # m/s^2, of a second without a pedal; of the drag, per root second
 LEAST_NOISE, GREATEST_NOISE = 0.5, 4.0  # times that variance, as measured
 BEFORE, MEMORY = 4.0, 10.0  # applications that the prior of this ratio is worth; that are remembered
 GATE = 2.5
@@ -95,12 +99,15 @@ def keep_filter(state: Record, learned: Record) -> None:
 
 
 @kernel
-def bend(linings: float, ceiling: float) -> tuple[float, float, float]:
-    """Return the deceleration f of linings below a ceiling, and its derivatives by ln L and ln c."""
-    base = 1.0 + (linings / ceiling) ** KNEE
+def bend(linings: float, ceiling: float, fall: float) -> tuple[float, float, float, float]:
+    """Return the deceleration f of linings below a ceiling, and its derivatives by ln L, ln c and h."""
+    asked = (linings / ceiling) ** KNEE
+    base = 1.0 + asked
     decel = linings * base ** (-1.0 / KNEE)
     steep = decel / base
-    return decel, steep, decel - steep
+    beyond = asked**3 / (1.0 + asked**3)
+    left, falls = 1.0 - fall * beyond, 3.0 * KNEE * fall * beyond * (1.0 - beyond) * decel
+    return decel * left, steep * left - falls, (decel - steep) * left + falls, -beyond * decel
 
 
 @kernel
@@ -116,18 +123,30 @@ def ceiling_of(state: Record) -> float:
 
 
 @kernel
+def published_ceiling(state: Record) -> tuple[float, float]:
+    """Return the ceiling midway between its peak and what is left beyond, and its sigma [m/s^2]."""
+    p, left = state.covariance, 1.0 - 0.5 * state.value[FALL]
+    variance = p[GRIP, GRIP] + (0.25 * p[FALL, FALL] / left - p[GRIP, FALL]) / left
+    ceiling = ceiling_of(state) * left
+    return ceiling, ceiling * math.sqrt(variance)
+
+
+@kernel
 def usual_noise(expected: float) -> float:
     """Return the variance of an application's mean [m^2/s^4], `expected` of the linings [m/s^2]."""
     return NOISE**2 + (NOISE_SHARE * expected) ** 2
 
 
 @kernel
-def variance_of_mean(state: Record, expected: float, by_scale: float, by_grip: float) -> float:
+def variance_of_mean(
+    state: Record, expected: float, by_scale: float, by_grip: float, by_fall: float
+) -> float:
     """Return the variance [m^2/s^4] with which the mean of an application at `USUAL_SPEED` is predicted."""
-    p = state.covariance
-    own = by_scale * by_scale * p[SCALE, SCALE] + by_grip * by_grip * p[GRIP, GRIP] + p[OVERRUN, OVERRUN]
-    shared = by_scale * by_grip * p[SCALE, GRIP] + by_scale * p[SCALE, OVERRUN] + by_grip * p[GRIP, OVERRUN]
-    variance: float = own + 2.0 * shared + state.noise_ratio * usual_noise(expected)
+    p, h = state.covariance, (by_scale, by_grip, 1.0, 0.0, 0.0, by_fall)
+    variance: float = state.noise_ratio * usual_noise(expected)
+    for i in range(STATES):
+        for j in range(STATES):
+            variance += h[i] * h[j] * p[i, j]
     return variance
 
 
@@ -150,8 +169,8 @@ def believe_windows(state: Record) -> None:
 def _keep_within_bounds(state: Record) -> bool:
     """Return states to their bounds; return whether one had left them that no car and no road explains.
 
-    A ceiling belongs to the road, a pedal that brings no drag is one: what coasting shows is then the drag,
-    and the others follow.
+    A ceiling and its fall belong to the road, a pedal that brings no drag is one: what coasting shows is then
+    the drag, and the others follow.
     """
     x, p, found = state.value, state.covariance, False
     for i in range(STATES - 1, -1, -1):
@@ -162,7 +181,7 @@ def _keep_within_bounds(state: Record) -> bool:
             for j in range(PEDAL):
                 x[j] += p[j, i] / p[i, i] * back
         x[i] += back
-        found = found or not (i == GRIP or (i == PEDAL and back > 0.0))
+        found = found or not (i in (GRIP, FALL) or (i == PEDAL and back > 0.0))
     return found
 
 
@@ -174,7 +193,7 @@ def _correct(state: Record, measured: float, expected: float, noise: float) -> t
     """
     x, p, h, ph = state.value, state.covariance, state.h, state.ph
     innovation, likely = measured - expected, noise
-    for i in range(OVERRUN, STATES):
+    for i in range(OVERRUN, FALL):
         innovation -= h[i] * x[i]
     for i in range(STATES):
         ph[i] = 0.0
@@ -198,6 +217,7 @@ def correct_by_mean(
     by_scale: float,
     by_grip: float,
     by_power: float,
+    by_fall: float,
     alone: bool,
 ) -> None:
     """Correct the states by the mean of an application [m/s^2], by its derivatives.
@@ -205,12 +225,12 @@ def correct_by_mean(
     Where not `alone`, windows teach friction.
     """
     state.h[SCALE], state.h[GRIP], state.h[OVERRUN] = by_scale, by_grip, 1.0
-    state.h[PEDAL], state.h[POWER] = 0.0, by_power
+    state.h[PEDAL], state.h[POWER], state.h[FALL] = 0.0, by_power, by_fall
     usual = usual_noise(expected)
     innovation, likely, left = _correct(state, measured, expected, state.noise_ratio * usual)
     state.at_bound = 1 if _keep_within_bounds(state) else 0
     for i in range(STATES):
-        step = STEP[i] if alone or i == GRIP else BESIDE_STEP
+        step = STEP[i] if alone or i in (GRIP, FALL) else BESIDE_STEP
         if state.covariance[i, i] < PRIOR[i] ** 2:
             state.covariance[i, i] += state.noise_ratio * step * step
     product = min(innovation * innovation * left, GATE * GATE * likely)
@@ -222,7 +242,7 @@ def correct_by_mean(
 @kernel
 def correct_by_coasting(state: Record, measured: float, speed: float, time: float) -> None:
     """Correct the drag by what it was in a `time` [s] in which neither pedal was pressed [m/s^2]."""
-    state.h[SCALE] = state.h[GRIP] = 0.0
+    state.h[SCALE] = state.h[GRIP] = state.h[FALL] = 0.0
     state.h[OVERRUN], state.h[PEDAL], state.h[POWER] = 1.0, -1.0, per_power(speed)
     state.covariance[OVERRUN, OVERRUN] += COASTING_WALK**2 * time
     _correct(state, measured, 0.0, COASTING_NOISE**2 / time)

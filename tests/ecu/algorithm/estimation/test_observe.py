@@ -11,7 +11,7 @@ from ecu.contract.records import OUTPUTS
 OBSERVERS = [JOINT, OBSERVER1, OBSERVER2]
 SPEED = 20.0  # m/s
 RATIOS = {"test_ratio", "test_ratio_balance", "test_ratio_speed"}
-GRIP = ("grip_limit", "sigma_grip_limit", "grip_knee")
+GRIP = ("grip_limit", "sigma_grip_limit", "grip_knee", "grip_fall")
 NOT_ESTIMATED = {
     JOINT: {"test_ratio_balance", "test_ratio_speed"},  # nothing brakes or drives, and there is no reference
     # Only a filter of the whole car knows these.

@@ -29,6 +29,7 @@ from ecu.algorithm.estimation.joint.whole_filter import (
     BESIDE,
     BESIDE_DRAG,
     CEILING,
+    FALL,
     GATE,
     GREATEST_NOISE,
     GRIP,
@@ -99,7 +100,7 @@ class Bystander:
             self.window(bars[0], 0.0)
             add_to_whole(self.params, self.state, self.joint)
         self.state["time"] = self.state["measured"] = self.state["expected"] = self.state["linings"] = 0.0
-        self.state["by_scale"] = self.state["by_grip"] = self.state["by_power"] = 0.0
+        self.state["by_scale"] = self.state["by_grip"] = self.state["by_power"] = self.state["by_fall"] = 0.0
         for bar, decel in zip(bars, decels, strict=True):
             self.window(bar, decel, **others)
             add_to_whole(self.params, self.state, self.joint)
@@ -121,10 +122,11 @@ def test_the_filter_is_that_of_the_matrices(bystander: Bystander) -> None:
         bars = list(rng.uniform(5.0, 80.0, 30))
         decels = [0.9 * bystander.linings(bar) + 0.3 + rng.normal(0.0, 0.5) for bar in bars]
         asked = np.exp(x[SCALE]) * np.array([bystander.linings(bar) for bar in bars])
-        bent = np.array([bend(one, CEILING * np.exp(x[GRIP])) for one in asked])
-        h = np.array([bent[:, 1].mean(), bent[:, 2].mean(), 1.0, 0.0, 1.0 / SPEED - 1.0 / USUAL_SPEED])
+        bent = np.array([bend(one, CEILING * np.exp(x[GRIP]), x[FALL]) for one in asked])
+        by_scale, by_grip, by_fall = bent[:, 1:].mean(axis=0)
+        h = np.array([by_scale, by_grip, 1.0, 0.0, 1.0 / SPEED - 1.0 / USUAL_SPEED, by_fall])
         measured = np.mean([decel - bystander.rest(decel) for decel in decels])
-        innovation = measured - bent[:, 0].mean() - h[OVERRUN:] @ x[OVERRUN:]
+        innovation = measured - bent[:, 0].mean() - h[OVERRUN:FALL] @ x[OVERRUN:FALL]
         usual = NOISE**2 + (NOISE_SHARE * bent[:, 0].mean()) ** 2
         likely = float(h @ p @ h) + ratio * usual
         variance = max(likely, (innovation / GATE) ** 2)
@@ -144,7 +146,7 @@ def test_the_filter_is_that_of_the_matrices(bystander: Bystander) -> None:
     ("case", "off", "least", "most"),
     [  # m/s^2 by which the means differ; the bounds of the variance over the usual one
         ("a car as the law says", 0.05, 0.5, 0.6),
-        ("a car as the prior says", 0.28, 0.6, 1.6),
+        ("a car as the prior says", 0.38, 0.6, 1.6),
         ("a car that brakes otherwise each time", 0.8, 2.0, 4.0),
     ],
 )
@@ -170,11 +172,11 @@ def test_a_road_that_cuts_off_hard_is_learned_as_a_ceiling(bystander: Bystander)
     x = bystander.state["filter"]["value"]
     ceiling = CEILING * math.exp(x[GRIP])
     assert math.exp(x[SCALE]) == pytest.approx(1.3, rel=0.3)
-    assert ceiling == pytest.approx(9.0, rel=0.25)
+    assert max(bend(asked, ceiling, x[FALL])[0] for asked in range(1, 40)) == pytest.approx(9.0, rel=0.1)
     for asked in (4.0, 6.0, 8.0, 10.0, 14.0):
-        said = bend(math.exp(x[SCALE]) * asked, ceiling)[0] + x[OVERRUN]
+        said = bend(math.exp(x[SCALE]) * asked, ceiling, x[FALL])[0] + x[OVERRUN]
         said += x[POWER] * (1.0 / SPEED - 1.0 / USUAL_SPEED)
-        assert said == pytest.approx(min(1.3 * asked, 9.0), rel=0.18), asked
+        assert said == pytest.approx(min(1.3 * asked, 9.0), rel=0.06), asked
 
 
 @pytest.mark.parametrize(
@@ -206,12 +208,13 @@ def test_a_drag_that_no_car_has_is_reported(
 ) -> None:
     """Light and hard applications alike brake by as much more than the linings."""
     p, state, per_bar = bystander.params, bystander.state, bystander.linings(1.0)
+    estimate, found = np.ones(1, ESTIMATE)[0], []
     for decel in (1.0, 5.0, 2.0, 6.0, 1.5, 4.0):
         bystander.brake([decel / per_bar] * 30, [decel + drag + bystander.rest(0.0)] * 30)
-    estimate = np.ones(1, ESTIMATE)[0]
-    estimate["at_bound"] = 0
-    tell_whole(p, state, bystander.joint, estimate)
-    assert bool(estimate["at_bound"]) == reported
+        estimate["at_bound"] = 0
+        tell_whole(p, state, bystander.joint, estimate)
+        found.append(bool(estimate["at_bound"]))
+    assert any(found) == reported
     assert estimate["overrun"] <= HIGHEST_STATE[OVERRUN]
 
 
@@ -412,17 +415,17 @@ def test_how_the_linings_share_the_force_is_not_shown_by_their_sum(bystander: By
 def test_estimate_and_store_have_the_scale(bystander: Bystander) -> None:
     """Its sigma adds to that of the windows; what the store takes stays within its bounds."""
     p, state = bystander.params, bystander.state
-    state["filter"]["value"] = [math.log(1.2), math.log(0.5), 0.4, 0.0, 1.5]
-    state["filter"]["covariance"] = np.diag([0.03, 0.02, 0.1, 0.0, 0.0]) ** 2
+    state["filter"]["value"] = [math.log(1.2), math.log(0.5), 0.4, 0.0, 1.5, 0.2]
+    state["filter"]["covariance"] = np.diag([0.03, 0.02, 0.1, 0.0, 0.0, 0.0]) ** 2
     estimate = np.zeros(1, ESTIMATE)[0]
     estimate["mu"], estimate["sigma"] = p["mu_nominal"], 0.04 * p["mu_nominal"]
     state["alone"] = 0
     tell_whole(p, state, bystander.joint, estimate)
     assert estimate["mu"] == pytest.approx(1.2 * p["mu_nominal"])
     assert estimate["sigma"] == pytest.approx(1.2 * p["mu_nominal"] * math.hypot(0.03, 0.04))
-    assert estimate["grip_limit"] == pytest.approx(7.0)
-    assert estimate["sigma_grip_limit"] == pytest.approx(0.14)
-    assert (estimate["overrun_power"], estimate["grip_knee"]) == (1.5, KNEE)
+    assert estimate["grip_limit"] == pytest.approx(7.0 * 0.9)
+    assert estimate["sigma_grip_limit"] == pytest.approx(0.14 * 0.9)
+    assert (estimate["overrun_power"], estimate["grip_knee"], estimate["grip_fall"]) == (1.5, KNEE, 0.2)
     assert estimate["overrun"] == pytest.approx(0.4)  # no torque is said to be known
     assert estimate["sigma_overrun"] == pytest.approx(math.hypot(0.1, NOISE))
     learned = np.zeros(1, LEARNED)[0]

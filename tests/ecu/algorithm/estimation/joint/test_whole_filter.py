@@ -9,6 +9,7 @@ import pytest
 from ecu.algorithm.estimation.joint.whole_filter import (
     CEILING,
     COASTING_NOISE,
+    FALL,
     FILTER_STATE,
     FULL_TORQUE,
     GRIP,
@@ -28,6 +29,7 @@ from ecu.algorithm.estimation.joint.whole_filter import (
     forget_filter,
     keep_filter,
     per_power,
+    published_ceiling,
     restore_filter,
 )
 from ecu.contract.records import LEARNED
@@ -41,38 +43,74 @@ def state() -> Any:
     return new
 
 
+def law(state: Any, linings: float) -> tuple[float, float, float, float]:
+    """Return what the filter expects of `linings` [m/s^2], and its derivatives."""
+    x = state["value"]
+    return bend(math.exp(x[SCALE]) * linings, CEILING * math.exp(x[GRIP]), x[FALL])
+
+
 def brake(state: Any, linings: float, decel: float, speed: float = USUAL_SPEED) -> None:
     """Correct by an application of constant `linings` [m/s^2] at a constant speed."""
-    expected, by_scale, by_grip = bend(
-        math.exp(state["value"][SCALE]) * linings, CEILING * math.exp(state["value"][GRIP])
-    )
-    correct_by_mean(state, decel, expected, by_scale, by_grip, per_power(speed), True)
+    expected, by_scale, by_grip, by_fall = law(state, linings)
+    correct_by_mean(state, decel, expected, by_scale, by_grip, per_power(speed), by_fall, True)
 
 
+@pytest.mark.parametrize("fall", [0.0, 0.3])
 @pytest.mark.parametrize("linings", [0.1, 3.0, 9.0, 14.0, 40.0])
-def test_derivatives_of_the_bend_are_those_of_differences(linings: float) -> None:
+def test_derivatives_of_the_bend_are_those_of_differences(linings: float, fall: float) -> None:
     step, ceiling = 1e-6, 11.0
-    _, by_scale, by_grip = bend(linings, ceiling)
+    _, by_scale, by_grip, by_fall = bend(linings, ceiling, fall)
     up, down = math.exp(step), math.exp(-step)
-    more, less = (bend(linings * by, ceiling)[0] for by in (up, down))
-    assert by_scale == pytest.approx((more - less) / (2 * step), rel=1e-5)
-    more, less = (bend(linings, ceiling * by)[0] for by in (up, down))
+    more, less = (bend(linings * by, ceiling, fall)[0] for by in (up, down))
+    assert by_scale == pytest.approx((more - less) / (2 * step), rel=1e-5, abs=1e-7)
+    more, less = (bend(linings, ceiling * by, fall)[0] for by in (up, down))
     assert by_grip == pytest.approx((more - less) / (2 * step), rel=1e-5, abs=1e-7)
+    more, less = (bend(linings, ceiling, fall + by)[0] for by in (step, -step))
+    assert by_fall == pytest.approx((more - less) / (2 * step), rel=1e-5, abs=1e-7)
 
 
 @pytest.mark.parametrize(
-    ("case", "share", "expected", "within"),
+    ("case", "fall", "share", "expected", "within"),
     [
-        ("gentle: the linings'", 0.05, 0.05, 0.001),
-        ("a tanh, next to it", 0.5, math.tanh(0.5), 0.05),
-        ("a tanh, next to it", 1.0, math.tanh(1.0), 0.05),
-        ("asked for far too much: the ceiling", 3.0, 1.0, 0.02),
+        ("gentle: the linings'", 0.2, 0.05, 0.05, 0.001),
+        ("below the limit nothing falls", 0.2, 0.6, math.tanh(0.6), 0.1),
+        ("a tanh, next to it", 0.0, 0.5, math.tanh(0.5), 0.05),
+        ("a tanh, next to it", 0.0, 1.0, math.tanh(1.0), 0.05),
+        ("asked for far too much: the ceiling", 0.0, 3.0, 1.0, 0.02),
+        ("asked for far too much: what slides", 0.2, 3.0, 0.8, 0.02),
     ],
 )
 def test_brakes_give_what_linings_ask_up_to_the_ceiling(
-    case: str, share: float, expected: float, within: float
+    case: str, fall: float, share: float, expected: float, within: float
 ) -> None:
-    assert bend(share * 10.0, 10.0)[0] == pytest.approx(10.0 * expected, rel=within)
+    assert bend(share * 10.0, 10.0, fall)[0] == pytest.approx(10.0 * expected, rel=within)
+
+
+@pytest.mark.parametrize(("peak", "beyond"), [(9.0, 9.0), (9.0, 7.0), (9.0, 5.5), (12.0, 8.0)])
+def test_what_is_lost_beyond_the_limit_is_no_poorer_road(state: Any, peak: float, beyond: float) -> None:
+    """Half of the applications ask for up to 0.7 of the peak, half for twice it."""
+
+    def gives(share: float) -> float:
+        return peak * math.tanh(share) if share < 1.0 else beyond
+
+    for share in (0.4, 2.0, 0.7, 2.2, 0.55, 1.8) * 6:
+        brake(state, share * peak, gives(share) + 0.2)
+    for share in (0.4, 0.7, 2.0):
+        said = law(state, share * peak)[0] + state["value"][OVERRUN]
+        assert said == pytest.approx(gives(share) + 0.2, rel=0.03), share
+
+
+def test_the_published_ceiling_is_midway_from_peak_to_slide(state: Any) -> None:
+    """Its sigma beside draws of both states."""
+    x, p = state["value"], state["covariance"]
+    x[GRIP], x[FALL] = math.log(10.0 / CEILING), 0.2
+    p[GRIP, GRIP], p[FALL, FALL], p[GRIP, FALL] = 0.1**2, 0.1**2, 0.006
+    p[FALL, GRIP] = p[GRIP, FALL]
+    ceiling, sigma = published_ceiling(state)
+    assert ceiling == pytest.approx(9.0)
+    both = p[np.ix_([GRIP, FALL], [GRIP, FALL])]
+    drawn = np.random.default_rng(1).multivariate_normal([x[GRIP], x[FALL]], both, 20_000)
+    assert sigma == pytest.approx(np.std(CEILING * np.exp(drawn[:, 0]) * (1.0 - 0.5 * drawn[:, 1])), rel=0.03)
 
 
 @pytest.mark.parametrize(
@@ -85,7 +123,7 @@ def test_a_constant_power_drags_less_the_faster_the_car(speed: float, drag: floa
 
 def test_what_was_learned_comes_back_less_certain(state: Any) -> None:
     learned = np.zeros(1, LEARNED)[0]
-    state["value"], state["covariance"] = [0.2, -0.3, 0.5, 0.3, 2.0], 0.001 * (np.eye(STATES) + 0.2)
+    state["value"], state["covariance"] = [0.2, -0.3, 0.5, 0.3, 2.0, 0.1], 0.001 * (np.eye(STATES) + 0.2)
     keep_filter(state, learned)
     again = np.zeros(1, FILTER_STATE)[0]
     restore_filter(again, learned)
@@ -117,7 +155,8 @@ def test_a_value_that_no_car_has_is_reported_until_the_next_application(
     assert (state["value"] >= LOWEST_STATE).all()
     assert (state["value"] <= HIGHEST_STATE).all()
     x = state["value"]
-    brake(state, 4.0, bend(4.0 * math.exp(x[SCALE]), CEILING * math.exp(x[GRIP]))[0] + x[OVERRUN])
+    x *= 0.99
+    brake(state, 4.0, law(state, 4.0)[0] + x[OVERRUN])
     assert not state["at_bound"]
 
 
@@ -146,7 +185,7 @@ def test_the_drag_of_the_first_application_is_known_before_it(state: Any) -> Non
     for _ in range(20):
         correct_by_coasting(state, 1.8, USUAL_SPEED, 0.05)
     assert state["value"][OVERRUN] == pytest.approx(1.8, abs=0.4)
-    shown = np.array([0.0, 0.0, 1.0, -1.0, 0.0])
+    shown = np.array([0.0, 0.0, 1.0, -1.0, 0.0, 0.0])
     assert shown @ state["covariance"] @ shown < 1.3 * COASTING_NOISE**2
 
 
