@@ -75,7 +75,7 @@ def test_the_name_of_the_event_is_uploaded(master):
     [
         ("F4 01 00 00 00 00 00 00", "24"),  # address 0
         ("F4 01 00 00 FF FF 00 00", "24"),  # one byte before the outputs
-        ("F4 02 00 00 7F 03 01 00", "24"),  # over the end of the outputs
+        ("F4 02 00 00 87 03 01 00", "24"),  # over the end of the outputs
         ("F4 01 00 00 FF FF FF FF", "24"),
         ("F4 01 00 01 00 00 01 00", "24"),  # another address space
         ("F4 00 00 00 00 00 01 00", "22"),
