@@ -279,8 +279,7 @@ def watch_speeds(
     _gather(params, state, inputs, estimate)
     median, accel = _median(state, witness), estimate.accel_x
     braked = accel < DRAGGED_ACCEL
-    accelerates = driver_accelerates(inputs) or accel > DRIVEN_ACCEL
-    drives = accelerates
+    drives = accelerates = driver_accelerates(inputs) or accel > DRIVEN_ACCEL
     for i in range(4):
         state.torque[i] += (estimate.brake_torque[i] - state.torque[i]) * min(dt / SMOOTHING_S, 1.0)
         braked = braked or state.torque[i] > TORQUE
