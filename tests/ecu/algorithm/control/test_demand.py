@@ -183,15 +183,15 @@ def test_an_automated_demand_ends_at_once_only_where_it_is_withdrawn(
 ) -> None:
     state = np.zeros(1, DEMAND_STATE)[0]
     assert hold_automated(state, feed(decel_demand=4.0, decel_demand_valid=1.0)[0], DT) == 0
-    got, told = [], []
+    got, bits = [], []
     for _ in range(11):
         inputs = feed(pedal_position=0.0, decel_demand=4.0, decel_demand_valid=flag)[0]
         inputs["verdict"][DECEL_DEMAND], inputs["verdict"][DECEL_DEMAND_VALID] = value, flagged
-        told.append(hold_automated(state, inputs, DT))
+        bits.append(hold_automated(state, inputs, DT))
         got.append(update_demand(params[0], state, inputs, 20.0, DT))
     assert (got[0], got[8], got[10]) == asked, case
     at_once = DEMAND_LOST if reported and not asked[0] else 0
-    assert (told[0], told[8], told[10]) == (at_once, at_once, DEMAND_LOST if reported else 0)
+    assert (bits[0], bits[8], bits[10]) == (at_once, at_once, DEMAND_LOST if reported else 0)
     if reported:
         assert hold_automated(state, feed(decel_demand=2.0, decel_demand_valid=1.0)[0], DT) == 0, "it is back"
 

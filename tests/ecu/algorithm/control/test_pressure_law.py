@@ -143,7 +143,7 @@ def test_the_friction_in_use_moves_no_faster_than_half_a_unit_a_second(dt: float
         assert state["used"] == pytest.approx([0.45 + 0.5 * k * dt, 0.45 - 0.5 * k * dt, 0.45, 0.4501])
 
 
-def test_what_the_confirmation_is_told_are_means_of_the_wheels() -> None:
+def test_what_the_confirmation_gets_are_means_of_the_wheels() -> None:
     """Base over friction, aimed at and in use: the share of the nominal pressure that they need."""
     state = law(base=np.array([0.40, 0.42, 0.5, 0.5]))
     mu = np.array([0.38, 0.40, 0.47, 0.48])

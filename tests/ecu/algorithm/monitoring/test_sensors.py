@@ -97,7 +97,7 @@ ACCELEROMETERS = [
     ("it errs, and nobody knows how", -4.0, 0, 1, 0.0, 0.0, math.nan),
     ("it contradicts the others", -4.0, 1, 0, 0.0, 0.0, math.nan),
     ("beyond its range", -60.0, 0, 0, 0.0, 0.0, math.nan),
-    ("beyond it, the other way", 60.0, 0, 0, 0.0, 0.0, math.nan),
+    ("beyond it, forwards", 60.0, 0, 0, 0.0, 0.0, math.nan),
 ]
 
 
