@@ -7,7 +7,8 @@ wheel slower than the car may slide, so it is not judged.
 A wheel speed that falls faster than the brake could cause is a sensor fault: a broken wire reads 0. It is
 masked out until it agrees with the vehicle speed again, or the car is at standstill. One whose noise, by the
 second differences of its samples beside the others', is `NOISY` times the configured one is left out for as
-long as it is.
+long as it is. Wheels that spin shake, so while one is driven and turns faster than the road nothing is
+said of anyone's noise.
 
 A pressure follows the demands that were sent (`ecu.algorithm.hydraulics` models how) if the three others
 do. Where more than one does not, another controller brakes, or the demands are not executed: no sensor or
@@ -18,7 +19,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.inputs import fresh, motor_torque, others_brake, usable
+from ecu.algorithm.inputs import driver_accelerates, fresh, motor_torque, others_brake, usable
 from ecu.algorithm.lag import lag_gain
 from ecu.algorithm.monitoring.witness import compare, judge
 from ecu.algorithm.vehicle import corner_speed
@@ -115,6 +116,16 @@ def _common_change(state: Record, inputs: Record) -> float:
 
 
 @kernel
+def _spins(params: Record, inputs: Record, estimate: Record) -> bool:
+    """Return whether any wheel is driven and turns faster than the road."""
+    found, accelerates = False, driver_accelerates(inputs)
+    for i in range(4):
+        driven = accelerates or motor_torque(inputs, i) < -BRAKED
+        found = found or (driven and _over_ground(params, inputs, estimate, i) > 1.0 + ROLLING)
+    return found
+
+
+@kernel
 def watch_wheels(
     params: Record, state: Record, witness: Record, inputs: Record, estimate: Record, dt: float
 ) -> None:
@@ -122,7 +133,7 @@ def watch_wheels(
 
     Arguments as for `wheel_speed_implausible`.
     """
-    common = _common_change(state, inputs)
+    common, spins = _common_change(state, inputs), _spins(params, inputs, estimate)
     for i in range(4):
         state.age_s[i] += dt
         if fresh(inputs, WHEEL_SPEED + i):
@@ -139,7 +150,8 @@ def watch_wheels(
             if math.isfinite(common):
                 change = omega - state.omega[i] - common
                 jerk = min(abs(change - state.change[i]) / SECOND_DIFFERENCE, JUMP * params.sigma_wheel_speed)
-                state.jitter[i] += lag_gain(min(state.age_s[i], OLDEST_S), NOISE_S) * (jerk - state.jitter[i])
+                gain = 0.0 if spins else lag_gain(min(state.age_s[i], OLDEST_S), NOISE_S)
+                state.jitter[i] += gain * (jerk - state.jitter[i])
                 state.change[i] = change
             state.omega[i], state.age_s[i] = omega, 0.0
         noise = NOISY * params.sigma_wheel_speed

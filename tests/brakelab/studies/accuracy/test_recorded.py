@@ -3,8 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
+from brakelab.replay.command import replay_into
 from brakelab.studies.accuracy.recorded import (
     FOLDER,
     MUSTANG,
@@ -17,7 +19,9 @@ from brakelab.studies.accuracy.recorded import (
     other_table,
     pass_table,
 )
+from ecu.contract.faults import IMPLAUSIBLE, fault_mask
 from ecu.errors import UserError
+from ecu.settings.resources import resource
 
 ROOT = Path(__file__).parents[4]
 
@@ -41,6 +45,25 @@ def test_what_came_is_within_what_was_said(passes: list[Pass]) -> None:
     lines = application_table(passes).rows
     assert [line[0] for line in lines] == ["1"] * 3 + ["2"] * 3 + ["3"] * 3
     assert all(line[-1] == "met" for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("log", "config", "map"),
+    [(MUSTANG, "mustang", "mustang"), ("kona.log", "suv", "kona"), ("rav4.log", "suv", "rav4")],
+)
+def test_no_sound_sensor_of_a_recorded_car_is_named(tmp_path: Path, log: str, config: str, map: str) -> None:
+    """The Mustang's rear wheels spin three times, up to 25 %, and shake."""
+    out = tmp_path / "drive.parquet"
+    replay_into(
+        [ROOT / FOLDER / log],
+        resource(f"config/{config}.toml"),
+        resource(f"config/maps/{map}.toml"),
+        None,
+        None,
+        out,
+    )
+    columns = pq.read_table(out, columns=["active_faults", "active_faults_2"]).to_pydict()
+    assert not (fault_mask(columns) & sum(IMPLAUSIBLE.values())).any()
 
 
 def test_cuts_of_other_cars_teach_nothing() -> None:

@@ -13,7 +13,7 @@ from ecu.algorithm.monitoring.plausibility import (
     wheel_speed_implausible,
 )
 from ecu.algorithm.monitoring.witness import WITNESS_STATE
-from ecu.contract.signals import CALLIPER_PRESSURE, MOTOR_TORQUE, WHEEL_SPEED
+from ecu.contract.signals import ACCELERATOR_POSITION, CALLIPER_PRESSURE, MOTOR_TORQUE, WHEEL_SPEED
 
 WITNESS = np.zeros(1, WITNESS_STATE)[0]  # what is published does not matter here
 
@@ -174,6 +174,36 @@ def test_a_pressure_that_follows_again_is_believed_again(feed) -> None:
         said.append(bool(state["pressure"]))
     assert said[599]
     assert not any(said[632:])
+
+
+SHAKING = [
+    # case, rear wheels over ground, how they shake [m/s], accelerator [%], motor [N m], named
+    ("spin and shake under the engine", 1.15, 1.0, 60.0, 0.0, False),
+    ("under motors, accelerator unknown", 1.15, 1.0, None, -400.0, False),
+    ("shake while nobody drives", 1.15, 1.0, 0.0, 0.0, True),
+    ("shake, driven, at the car's speed", 1.0, 0.3, 60.0, 0.0, True),
+    ("driven, and quiet", 1.0, 0.02, 60.0, 0.0, False),
+]
+
+
+@pytest.mark.parametrize(
+    ("case", "turns", "shake", "accelerator", "motor", "named"), SHAKING, ids=[row[0] for row in SHAKING]
+)
+def test_wheels_that_spin_shake_and_their_sensors_are_sound(
+    params, feed, case, turns, shake, accelerator, motor, named
+) -> None:
+    state, witness = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, WITNESS_STATE)[0]
+    radius, speed = params[0]["wheel_radius"], 13.0
+    random = np.random.default_rng(0)
+    for _ in range(200):
+        rear = turns * speed + shake * random.standard_normal(2)
+        ground = np.array([speed, speed, *rear]) + 0.01 * random.standard_normal(4)
+        inputs = feed(wheel_speed=ground / radius, motor_torque=[0.0, 0.0, motor, motor])
+        inputs[0]["value"][ACCELERATOR_POSITION] = accelerator or 0.0
+        inputs[0]["verdict"][ACCELERATOR_POSITION] *= accelerator is not None
+        watch_wheels(params[0], state, witness, inputs[0], estimated(speed, 0.0), 0.01)
+    assert bool(state["noisy"].any()) == named, case
+    assert bool(witness["rejected"].any()) == named
 
 
 def test_a_lost_wheel_does_not_count_among_the_others(params, feed) -> None:
