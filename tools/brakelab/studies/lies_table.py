@@ -129,7 +129,11 @@ def drift_table(cells: list[Cell]) -> Table:
     columns = [f"{rate:g} %/s: {what}" for rate in rates for what in ("named after [s]", "force")]
     car, road = lies.SLOW_ON
     title = f"Drifts that are slow: {car}, {road}, {lies.MANY} brakings"
-    return Table(title, ("input", "drift of", *columns), rows, "")
+    note = (
+        "When the one upwards and the one downwards are named, and the force that both fall below or stay "
+        f"above for {LONG_S:g} s, the least and the greatest."
+    )
+    return Table(title, ("input", "drift of", *columns), rows, note)
 
 
 def lie_tables(cells: list[Cell], cars: int) -> list[Table]:
@@ -155,9 +159,7 @@ TEXT: Final = (
     "2 s after that began. Where a lie is worst, the friction that the ECU believes over the true one, "
     "and the motors' demand, are compared with the sound car's at the same time of that braking; faults are "
     "those that only the lie brings. Cars of the wide draw: lies by car 1, sound cars by the number in the "
-    "table. Of slow drifts the table has when the one upwards and the one downwards are named, and the force "
-    f"that both fall below or stay above for {LONG_S:g} s, the least and the greatest. "
-    "[faults.md](../faults.md) says what is left out, and by which witnesses."
+    "table. [faults.md](../faults.md) says what is left out, and by which witnesses."
 )
 
 
