@@ -260,20 +260,31 @@ def test_one_that_was_stopped_while_its_standby_braked_says_nothing_any_more(
     bench: Bench, daemon: Callable[..., Daemon]
 ) -> None:
     """The last test of the shared daemon: it yields."""
-    car, first = bench.car, bench.unit
-    car.drive(220)  # established
-    second = daemon(*arguments(bench.bus), "--standby")
-    second.wait_for("ready")
-    car.drive(20, until=lambda: second.said("mode", now="active"))
-    lines = len(second.seen)  # its start may have held up the first one: one CPU
+    car = bench.car
+
+    def standby() -> Daemon:
+        car.drive(220)  # established
+        made = daemon(*arguments(bench.bus), "--standby")
+        made.wait_for("ready")
+        car.drive(50, until=lambda: made.said("mode", now="active"))
+        return made
+
+    first, second = bench.unit, standby()
+    for _ in patience():
+        if not first.said("falls_silent"):
+            break
+        first, second = second, standby()  # whose start held up the first one for too long: one CPU
+    lines = len(second.seen)
     os.kill(first.process.pid, signal.SIGSTOP)
-    os.waitpid(first.process.pid, os.WUNTRACED)
-    car.drive(20, until=lambda: "takes_over" in events_since(second, lines))
-    car.set(decel_demand=0)
-    car.drive(100)
-    end = time.monotonic() + STILL_S
-    heard = [car.drive(10, until=lambda: time.monotonic() > end)]
-    os.kill(first.process.pid, signal.SIGCONT)
+    try:
+        os.waitpid(first.process.pid, os.WUNTRACED)
+        car.drive(20, until=lambda: "takes_over" in events_since(second, lines))
+        car.set(decel_demand=0)
+        car.drive(100)
+        end = time.monotonic() + STILL_S
+        heard = [car.drive(10, until=lambda: time.monotonic() > end)]
+    finally:
+        os.kill(first.process.pid, signal.SIGCONT)
     heard.append(car.drive(100, until=lambda: first.said("falls_silent")))
     heard.append(car.drive(50))
     valid, pressure = front(np.concatenate(heard))
