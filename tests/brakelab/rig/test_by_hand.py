@@ -70,16 +70,18 @@ def test_a_fault_begins_when_its_line_comes(lines: list[str], begin: float, end:
 
 def test_frames_are_lost_from_the_cycle_in_which_it_is_typed() -> None:
     """The second line comes while the car drives, from the thread that reads."""
-    clock, at_rest = FakeClock(), Event()
+    clock, first_read, at_rest = FakeClock(), Event(), Event()
     bus, node = FakeBus(clock), new_node(scenario(1.0), 1)
     node = node._replace(side=node.side._replace(vehicle=with_room(node.side.vehicle)))
 
     def lines() -> Iterator[str]:
         yield "lost message=Imu t=0.3 duration=0.2"
+        first_read.set()
         at_rest.wait()
         yield "lost message=Steering"
 
     hand = Hand(node.side.vehicle, lines())
+    first_read.wait()
 
     def by_hand(t: float) -> None:
         if len(bus.sent) == 70:
