@@ -130,9 +130,10 @@ def judge(job: Job) -> Judged:
         law = refit(fitted, job.brake, seen)
     else:
         law, unseen = fitted.law, job.unseen
-    held_out = error_of(law, job.brake, unseen, False, closed=True)
-    seen_error = error_of(fitted.law, job.brake, job.stops, False, closed=True)
-    shares = (0.0, 1.0) if job.unseen is not None else (1.0 - HELD_OUT, HELD_OUT)
+    overall = held_out = error_of(law, job.brake, unseen, False, closed=True)
+    if job.unseen is None:
+        every = error_of(fitted.law, job.brake, job.stops, False, closed=True)
+        overall = float(np.sqrt((1.0 - HELD_OUT) * every**2 + HELD_OUT * held_out**2))
     return Judged(
         candidate.name,
         fitted.law,
@@ -140,7 +141,7 @@ def judge(job: Job) -> Judged:
         candidate.size,
         100.0 * float(np.sqrt(np.mean(fitted.residuals**2)) / np.mean(job.stops.mu)),
         held_out,
-        float(np.sqrt(shares[0] * seen_error**2 + shares[1] * held_out**2)),
+        overall,
         candidate.bounded,
         criterion(fitted, job.stops),
         tuple(
