@@ -22,6 +22,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from brakelab.plant.driver import drive
+from brakelab.results.outputs import whole
 from brakelab.rig.by_hand import Hand, with_room
 from brakelab.simulation.closed_loop import Plans, plans
 from brakelab.simulation.fault_kernels import Link, deliver, new_link
@@ -48,7 +49,6 @@ from ecu.bus.receive import Reception, new_reception, receive
 from ecu.bus.transmit import Transmission, frame_buffer, new_transmission, transmit
 from ecu.contract.records import FRAME, RecordArray
 from ecu.contract.signals import CYCLE_NS, N_OUTPUTS
-from ecu.errors import UserError
 from ecu.jit import kernel
 from ecu.runtime.clock import Grid, TimeSource, system_time
 
@@ -223,11 +223,8 @@ def write_truth_file(path: Path, truth: Truth, scenario: str, seed: int) -> None
         UserError: the file cannot be written.
     """
     metadata = {"start_time_ns": str(truth.start_ns), "scenario": scenario, "seed": str(seed)}
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_columns(path, truth.t, dict(zip(TRUTH_COLUMNS, truth.values.T, strict=True)), metadata)
-    except OSError as error:
-        raise UserError(str(path), "", f"cannot be written ({error.strerror}); choose another file") from None
+    with whole(path, "file") as part:
+        write_columns(part, truth.t, dict(zip(TRUTH_COLUMNS, truth.values.T, strict=True)), metadata)
 
 
 def warm_up(scenario: Scenario) -> None:
