@@ -170,8 +170,8 @@ def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
     power = float(np.nan_to_num(before[OUTPUT["overrun_power"]]))
     learned = _Car(corners(before, "mu_b"), mass, overrun, power)
     if np.isfinite(before[OUTPUT["grip_knee"]]):
-        grip = (float(np.nan_to_num(before[OUTPUT[f"grip_{name}"]])) for name in ("limit", "knee", "fall"))
-        ceiling, knee, fall = grip
+        bend = [OUTPUT["grip_limit"], OUTPUT["grip_knee"], OUTPUT["grip_fall"]]
+        ceiling, knee, fall = np.nan_to_num(before[bend])
         motors = before[OUTPUT["motor_torque_share"]]
         learned = learned._replace(ceiling=ceiling, knee=knee, fall=fall, motors=motors)
     configured = _Car(p["mu_nominal"], float(p["mass"]), 0.0)
