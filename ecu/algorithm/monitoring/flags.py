@@ -2,8 +2,8 @@
 
 reverse        believed if it is set below `ENGAGED` and while the car is slower than `FASTEST_BACK`, as long
                as the wheels do not gain speed where the accelerometer reads forwards: backwards they lose it.
-ABS, ESP       stand for `LONGEST_S` without a wheel beyond `SLIPS` of slip; an ESP in a bend for three times
-               as long.
+ABS, ESP       stand for `LONGEST_S` without a wheel beyond `SLIPS` of slip; an ESP in a bend for five times
+               as long, an ABS that has no brake to release for a third.
 accelerator    that does not move through two brakings is at its rest, which is taken off.
 """
 
@@ -53,8 +53,9 @@ START_S = 1.0  # in which an ECU that starts in a moving car believes the flag
 RATE_S, USUAL_S, FADING_S = 0.15, 2.0, 3.0
 MOVED = 0.5  # m^2/s^3, from which the sign of the motion is known
 FORWARDS = 0.4  # of the square, share that the product has
-LONGEST_S, SLIPS = 5.0, 0.05
-BENDING, IN_A_BEND = 2.0, 3.0  # m/s^2, times as long
+LONGEST_S, SLIPS = 3.0, 0.05
+BENDING, IN_A_BEND = 2.0, 5.0  # m/s^2, times as long
+RELEASED = 3.0  # times as fast
 LEAST_SPEED = 3.0  # m/s, for slip
 STEADY, THROUGH_S = 0.5, 1.0  # %, s
 THROUGH = 0.7  # of a braking: a foot moves on before the brakes are released
@@ -184,7 +185,7 @@ def correct_flags(
         leave_out(witness, REVERSE)
     slips = _some_wheel_slips(params, inputs, estimate)
     bending = abs(estimate.accel_y) > BENDING
-    state.abs_s = _stands(state.abs_s, _set(inputs, ABS_ACTIVE), slips, dt)
+    state.abs_s = _stands(state.abs_s, _set(inputs, ABS_ACTIVE), slips, dt if braking else RELEASED * dt)
     state.esp_s = _stands(state.esp_s, _set(inputs, ESP_ACTIVE), slips, dt / IN_A_BEND if bending else dt)
     if _set(inputs, ABS_ACTIVE):
         _contradict(witness, ABS_ACTIVE, state.abs_s / LONGEST_S)

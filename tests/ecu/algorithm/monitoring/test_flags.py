@@ -78,21 +78,22 @@ def test_reverse_that_is_set_in_a_moving_car_is_never_believed(params, feed) -> 
 
 
 @pytest.mark.parametrize(
-    ("name", "turns", "across", "believed"),
+    ("name", "turns", "across", "braking", "believed"),
     [
-        ("abs_active", 1.0, 0.0, LONGEST_S),
-        ("abs_active", 0.8, 0.0, 30.0),
-        ("esp_active", 1.0, 0.0, LONGEST_S),
-        ("esp_active", 1.0, 3.0, 3.0 * LONGEST_S),
-        ("esp_active", 0.8, 3.0, 30.0),
+        ("abs_active", 1.0, 0.0, True, LONGEST_S),
+        ("abs_active", 1.0, 0.0, False, LONGEST_S / 3.0),
+        ("abs_active", 0.8, 0.0, True, 30.0),
+        ("esp_active", 1.0, 0.0, False, LONGEST_S),
+        ("esp_active", 1.0, 3.0, True, 5.0 * LONGEST_S),
+        ("esp_active", 0.8, 3.0, True, 30.0),
     ],
 )
 def test_a_controller_that_has_no_wheel_to_hold_is_not_believed_for_ever(
-    params, feed, name: str, turns: float, across: float, believed: float
+    params, feed, name: str, turns: float, across: float, braking: bool, believed: float
 ) -> None:
     car = Car(params, feed, 20.0)
     car.across = across
-    lost = car.drive(30.0, turns, **{name: 1.0})
+    lost = car.drive(30.0, turns, braking=braking, **{name: 1.0})
     assert 30.0 - lost == pytest.approx(believed, abs=0.05)
     assert bool(car.said[-1] & IMPLAUSIBLE[name]) == (lost > 0.0)
     car.drive(0.02, **{name: 0.0})
