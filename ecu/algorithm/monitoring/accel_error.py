@@ -26,7 +26,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.inputs import fresh
+from ecu.algorithm.monitoring.accel_timing import ACCEL_TIMING_STATE
 from ecu.algorithm.monitoring.acceleration import BLOCK_S, ROLLED, SHOWN, A, F, W
 from ecu.algorithm.monitoring.error_line import (
     LINE_STATE,
@@ -61,8 +61,7 @@ ACCEL_ERROR_STATE = np.dtype(
         ("stood_s", "f8"),
         ("zero_off", "f8"),  # taken off the reading [m/s^2]
         ("scale_off", "f8"),  # of it
-        ("reading", "f8"),  # last sample [m/s^2]
-        ("same_s", "f8"),  # time for which every sample has been that
+        ("timing", ACCEL_TIMING_STATE),
     ],
     align=True,
 )
@@ -94,7 +93,6 @@ PROVING, ENGINE, ENGINE_ZERO = 1.0, 0.2, 0.25  # m/s^2; of it, m/s^2: what an un
 PROVEN_S, SURE_S, REFUTES = 0.5, 3.0, 5.0  # s, s; times as fast as it is proven
 USUAL = 0.5  # of that, within which the torques are as usual
 CONFIRMED, KEPT = 0.5, 0.4  # of the zero, what the wheels must show of it too; of a doubt, what keeps it
-SAME_S, CHANGED = 0.6, 1.0  # s of blocks that are compared; m/s^2, of the wheels' deceleration meanwhile
 
 
 @kernel
@@ -320,28 +318,6 @@ def follow_accel_error(
         compare(witness, ACCEL_X, shown * LEAST_SHOWN, SCALE_DOUBT * LEAST_SHOWN)
         still = state.scale_off != 0.0 and abs(by_wheels) > KEPT * SCALE_DOUBT
         state.scale_off = by_wheels if still or abs(shown) > SCALE_DOUBT else 0.0
-
-
-@kernel
-def watch_frozen(state: Record, blocks: Record, witness: Record, inputs: Record, dt: float) -> None:
-    """Reject a reading whose samples are all the same while the wheels' deceleration changes.
-
-    Args:
-        state: `ACCEL_ERROR_STATE`, overwritten.
-        blocks: `ACCELERATION_STATE`.
-        witness: `WITNESS_STATE`; the accelerometer's fields are overwritten.
-        inputs: `INPUTS` as received.
-        dt: time since the last cycle [s].
-    """
-    if fresh(inputs, ACCEL_X):
-        same = inputs.value[ACCEL_X] == state.reading
-        state.reading, state.same_s = inputs.value[ACCEL_X], state.same_s + dt if same else 0.0
-    if state.same_s == 0.0:
-        witness.rejected[ACCEL_X] = 0
-    mean = blocks.mean
-    change = (mean[0, ROLLED] - mean[1, ROLLED] - mean[3, ROLLED] + mean[4, ROLLED]) / BLOCK_S
-    if state.same_s > SAME_S and compare(witness, ACCEL_X, -change, CHANGED) > 1.0:
-        witness.rejected[ACCEL_X] = 1
 
 
 @kernel

@@ -44,13 +44,7 @@ from ecu.algorithm.inputs import (
 from ecu.algorithm.monitoring.witness import compare, compare_both
 from ecu.algorithm.vehicle import tyre_slip
 from ecu.contract.params import GRAVITY
-from ecu.contract.signals import (
-    ACCEL_X,
-    CALLIPER_PRESSURE,
-    MOTOR_TORQUE,
-    REVERSE,
-    WHEEL_SPEED,
-)
+from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, MOTOR_TORQUE, REVERSE, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
 A, W, F, ROLLED = range(4)
@@ -68,6 +62,7 @@ ACCELERATION_STATE = np.dtype(
         ("mean", "f8", (BLOCKS, KINDS)),
         ("good_blocks", "i8"),  # in a row
         ("known_blocks", "i8"),  # in a row
+        ("told_blocks", "i8"),  # the same, also since it was believed again
         ("sigma", "f8"),  # of a - w by the sensors' noise [m/s^2]
         ("beyond", "i8"),  # consecutive blocks beyond any road
         ("opposed", "i8"),  # consecutive blocks in which it reads forwards while the linings slow the wheels
@@ -169,6 +164,7 @@ def _close_block(params: Record, state: Record) -> None:
     sound = state.good != 0 and state.time < LONGEST_BLOCK_S
     state.good_blocks = state.good_blocks + 1 if sound else 0
     state.known_blocks = state.known_blocks + 1 if sound and state.known else 0
+    state.told_blocks = state.told_blocks + 1 if sound and state.known else 0
     state.time, state.cycles, state.readings, state.good, state.known = 0.0, 0, 0, 1, 1
 
 
@@ -346,5 +342,8 @@ def watch_acceleration(
     state.time += dt
     if state.time > BLOCK_S - 0.001:
         _close_block(params, state)
+        if witness.rejected[ACCEL_X]:
+            state.implausible = 0  # as a whole: it has a name
+            return
         reverses = estimate.backwards or inputs.value[REVERSE] > 0.5
         _judge(state, witness, slope, braking and not (reverses or driver_accelerates(inputs)))

@@ -16,8 +16,8 @@ from ecu.algorithm.monitoring.accel_error import (
     all_wheels_scaled,
     correct_accel,
     follow_accel_error,
-    watch_frozen,
 )
+from ecu.algorithm.monitoring.accel_timing import watch_timing
 from ecu.algorithm.monitoring.acceleration import watch_acceleration, wheels_deny
 from ecu.algorithm.monitoring.carried import OVER_GROUND
 from ecu.algorithm.monitoring.failed_brakes import watch_brakes
@@ -75,8 +75,10 @@ def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
     braking = s.application.braking != 0
     base, slope = s.control.base, s.accel_error.wheels.usual.offset
     watch_acceleration(p, s.acceleration, s.witness, u, estimate, base, slope, braking, dt)
-    watch_frozen(s.accel_error, s.acceleration, s.witness, u, dt)
-    if s.acceleration.time == 0.0 and not s.witness.rejected[ACCEL_X]:
+    watch_timing(s.accel_error.timing, s.acceleration, s.witness, u, dt)
+    if s.witness.rejected[ACCEL_X]:
+        s.accel_error.apart = 0.0  # it says nothing of motors either
+    elif s.acceleration.time == 0.0:
         follow_accel_error(p, s.accel_error, s.witness, s.acceleration, estimate.accel_y, braking)
     if accel_doubted(s.accel_error):
         faults |= ACCEL_X_DRIFTED

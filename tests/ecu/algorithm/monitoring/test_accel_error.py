@@ -9,8 +9,8 @@ from ecu.algorithm.monitoring.accel_error import (
     accel_unknown,
     correct_accel,
     follow_accel_error,
-    watch_frozen,
 )
+from ecu.algorithm.monitoring.accel_timing import watch_timing
 from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE, watch_acceleration
 from ecu.algorithm.monitoring.witness import WITNESS_STATE
 from ecu.contract.params import GRAVITY
@@ -35,9 +35,7 @@ class Car:
         t %= 12.0
         return 2.5 if t < 4.0 else 0.0 if t < 7.0 else -4.0 * min((t - 7.0) / 0.4, 1.0) if t < 9.5 else 0.0
 
-    def drive(
-        self, seconds, zero=0.0, scale=0.0, slope=0.0, motors=1.0, rolled=1.0, frozen=False, grows=False
-    ) -> None:
+    def drive(self, seconds, zero=0.0, scale=0.0, slope=0.0, motors=1.0, rolled=1.0, grows=False) -> None:
         """Drive on.
 
         Args:
@@ -47,7 +45,6 @@ class Car:
             slope: of the road [m/s^2].
             motors: share of the driving force that their torques show.
             rolled: of their speed that all wheel speeds show.
-            frozen: the accelerometer's reading stays as it is.
             grows: these are what is added to each in a second.
         """
         p, base = self.p, self.p["mu_nominal"].copy()
@@ -73,15 +70,14 @@ class Car:
                 motor_torque=-wheel_torque * (motors if force > 0.0 else 0.0),
                 calliper_pressure=0.0,
             )
-            if not frozen:
-                self.inputs[0]["value"][INPUT["accel_x"]] = reading
+            self.inputs[0]["value"][INPUT["accel_x"]] = reading
             self.estimate["speed"] = rolled * speed
             self.estimate["brake_torque"] = np.maximum(-wheel_torque, 0.0)
             braking = force < 0.0
             watch_acceleration(
                 p, self.blocks, self.witness, self.inputs[0], self.estimate, base, 0.0, braking, DT
             )
-            watch_frozen(self.state, self.blocks, self.witness, self.inputs[0], DT)
+            watch_timing(self.state["timing"], self.blocks, self.witness, self.inputs[0], DT)
             if self.blocks["time"] == 0.0:
                 follow_accel_error(p, self.state, self.witness, self.blocks, 0.0, braking)
             if self.state["reported"] and self.reported is None:
