@@ -7,15 +7,14 @@ of the blocks of 0.1 s that `acceleration.py` gathers. Each is a Kalman filter o
 come and go with the force. Errors of mass, motors, drag and pitch are in them from the start, so what counts
 is what they have moved by from what is usual. That of the torques is a slow filter of the same blocks, which
 learns none that has moved by half of the tolerance; it is as uncertain as the present force is unlike those
-seen. That of the wheels is a mean, which stands still meanwhile.
+seen. That of the wheels is a mean, whose scale stands still where it has moved by half of `SCALE_DOUBT`.
 
 A zero moves b and c alike, a scale k and s: what has moved in both is taken off the reading, once the forces
 seen tell a zero from a scale. A c without b is a slope; a b without c is no zero of the accelerometer
 (`motors.py`), an s without k none of its scale. What both lines have moved by, where the car is now, tells
-the accelerometer's name before that; it is left out until then. Who gets in at a standstill changes b and k:
-then they are learned anew.
-
-A reading that is off by more than `GROSS` at once is not followed: it is implausible as a whole.
+the accelerometer's name before that; it is left out until then. A scale that the vehicle speed shows too is
+taken off beyond `SOUND`. Who gets in at a standstill changes b and k: then they are learned anew. A reading
+that is off by more than `GROSS` at once is not followed: it is implausible as a whole.
 
 What the reading differs from the second line's mean by is kept for the motors (`motors.py`). A scale of the
 first line alone is that of all wheel speeds: reported, but used, for slip and radius are ratios of speeds;
@@ -34,6 +33,7 @@ from ecu.algorithm.monitoring.error_line import (
     correct_line,
     learn_offset,
     learn_scale,
+    lesser,
     moved_offset,
     moved_scale,
     sigma_line,
@@ -61,23 +61,26 @@ ACCEL_ERROR_STATE = np.dtype(
         ("stood_s", "f8"),
         ("zero_off", "f8"),  # taken off the reading [m/s^2]
         ("scale_off", "f8"),  # of it
+        ("scale_beyond", "f8"),  # of it, by the speed over ground too, beyond `SOUND`: not reported yet
+        ("ground", "f8"),  # what the vehicle speed usually reads above the wheels, of it
+        ("ground_s", "f8"),  # learning time of that [s]
         ("timing", ACCEL_TIMING_STATE),
     ],
     align=True,
 )
 
-OFFSET_START, SCALE_START = 0.5, 0.03  # m/s^2, -
+OFFSET_START, SCALE_START, SCALE_KNOWN = 0.5, 0.04, 0.035  # m/s^2, -, -
 LEAST_SHOWN = 2.0  # m/s^2, below which a scale does not show
 ACROSS = 2.0  # m/s^2, above which tyres drag by more than 0.03
 SLOPE_WALK, SCALE_WALK = 0.1, 0.01  # m/s^2 and - per root second
 ZERO_WALK, TORQUE_WALK = 0.03, 0.003  # likewise, of b and k
 NOISE, TORQUE_NOISE = 0.15, 0.1  # m/s^2, of a block's difference
-USUAL_WALK, USUAL_SCALE_WALK = 0.001, 0.0005  # as above, of the usual line: it follows within minutes
+USUAL_WALK, USUAL_SCALE_WALK = 0.001, 0.0001  # as above, of the usual line: it follows within minutes
 USUAL_NOISE = 0.15  # m/s^2: errors of its blocks last for some
 SLIP, SLIP_BY_SPEED = 0.1, 0.01  # of a change of force, -, s/m
 STEADY = 1.0  # m/s^2 in 0.2 s, beyond which tyre forces still build up
 GROSS = 1.5  # m/s^2
-SLOPE_S, SCALE_S = 10.0, 30.0  # memory of the usual c and s
+SLOPE_S, SCALE_S = 10.0, 120.0  # memory of the usual c and s
 FEWEST_S, FEWEST_SCALE_S, FEWEST_REPORTED_S = 2.0, 3.0, 5.0
 APART_S = 0.5
 KNOWN_OFFSET = 0.06  # m/s^2, standard deviation: forces of one size do not tell a zero from a scale
@@ -88,7 +91,7 @@ ROLLS_FREE = 1.0  # m/s^2
 UNMOVED = 0.4  # of that, what the torques show of it
 STANDS, STOOD_S = 0.1, 10.0  # m/s, s
 ZERO_DOUBT = 0.18  # m/s^2; sound cars stay below 0.1
-SCALE_DOUBT = 0.033  # of the lesser of both; sound cars stay below 0.032
+SCALE_DOUBT, SOUND = 0.033, 0.02  # of the lesser of both; sound cars stay below 0.032
 PROVING, ENGINE, ENGINE_ZERO = 1.0, 0.2, 0.25  # m/s^2; of it, m/s^2: what an unreported engine exceeds
 PROVEN_S, SURE_S, REFUTES = 0.5, 3.0, 5.0  # s, s; times as fast as it is proven
 USUAL = 0.5  # of that, within which the torques are as usual
@@ -114,6 +117,12 @@ def _wheels_accel(mean: Record) -> float:
 
 
 @kernel
+def _scale_usual(line: Record, moved: float) -> bool:
+    """Return whether a scale that has `moved` from the usual one may still be that."""
+    return bool(line.scale_s < FEWEST_SCALE_S or abs(moved) < USUAL * SCALE_DOUBT)
+
+
+@kernel
 def _follow_wheels(state: Record, mean: Record) -> None:
     """Correct c and s by the last block."""
     line = state.wheels
@@ -122,8 +131,9 @@ def _follow_wheels(state: Record, mean: Record) -> None:
     h = _wheels_accel(mean)
     if abs(h) < LEAST_SHOWN:
         h = 0.0  # noise of the wheels would show as a scale
-    elif not (accel_doubted(state) or state.rolls_wrong):
-        learn_scale(line, SCALE_S)
+        doubted = accel_doubted(state) or state.rolls_wrong != 0 or line.now.p[1] > SCALE_KNOWN**2
+        if not doubted and _scale_usual(line, moved_scale(line)):
+            learn_scale(line, SCALE_S)  # while it brakes, a slope that began with it is in the scale
     rolled = (mean[0, W] - mean[1, W]) / BLOCK_S
     innovation = 0.5 * (mean[0, A] + mean[1, A]) - rolled - line.now.offset - line.now.scale * h
     if change > STEADY or abs(innovation) > GROSS:
@@ -278,8 +288,20 @@ def _follow_torques(params: Record, state: Record, mean: Record, witness: Record
 
 
 @kernel
+def _scale_by_ground(state: Record, above: float) -> float:
+    """Return what wheels and vehicle speed both show of the scale, and the torques some of; else 0."""
+    if math.isnan(above):
+        return 0.0
+    if _scale_usual(state.wheels, above - state.ground):
+        state.ground_s = min(state.ground_s + BLOCK_S, SCALE_S)
+        state.ground += (above - state.ground) * BLOCK_S / state.ground_s
+    shown = lesser(moved_scale(state.wheels), moved_scale(state.wheels) - above + state.ground)
+    return shown if moved_scale(state.torques) * shown > KEPT * shown * shown else 0.0
+
+
+@kernel
 def follow_accel_error(
-    params: Record, state: Record, witness: Record, blocks: Record, across: float, braking: bool
+    params: Record, state: Record, witness: Record, blocks: Record, across: float, above: float, braking: bool
 ) -> None:
     """Overwrite what is to be taken off the accelerometer's reading.
 
@@ -289,6 +311,7 @@ def follow_accel_error(
         witness: `WITNESS_STATE`; what is published of the accelerometer is overwritten.
         blocks: `ACCELERATION_STATE`, whose last block was closed in this cycle.
         across: lateral acceleration [m/s^2].
+        above: what the vehicle speed reads above the wheels without their slip, of it; NaN: silent.
         braking: a brake application lasts.
     """
     wheels, torques = state.wheels, state.torques
@@ -296,11 +319,10 @@ def follow_accel_error(
         wheels.now.p[0], wheels.now.p[1] = OFFSET_START**2, SCALE_START**2
         torques.now.p[0], torques.now.p[1] = OFFSET_START**2, SCALE_MOST**2
         torques.usual.p[:] = torques.now.p
-    stands = abs(blocks.mean[0, ROLLED]) < STANDS
-    state.stood_s = state.stood_s + BLOCK_S if stands else 0.0
+    state.stood_s = state.stood_s + BLOCK_S if abs(blocks.mean[0, ROLLED]) < STANDS else 0.0
     doubted = accel_doubted(state)
-    for i in range(MOTOR_TORQUE, MOTOR_TORQUE + 4):
-        doubted = doubted or witness.rejected[i] != 0
+    for i in range(4):
+        doubted = doubted or witness.rejected[MOTOR_TORQUE + i] != 0
     if state.stood_s > STOOD_S and not doubted:
         torques.offset_s, torques.now.p[1] = 0.0, SCALE_MOST**2
         torques.usual.p[0], torques.usual.p[1], torques.usual.p[2] = OFFSET_START**2, SCALE_MOST**2, 0.0
@@ -310,17 +332,19 @@ def follow_accel_error(
         _follow_torques(params, state, blocks.mean, witness)
     else:
         state.apart = 0.0
-    by_wheels, by_torques = moved_scale(wheels), moved_scale(torques)
-    shown = by_wheels if abs(by_wheels) < abs(by_torques) else by_torques
-    if by_wheels * by_torques <= 0.0:
-        shown = 0.0
-    if wheels.scale_s > FEWEST_SCALE_S and _zero_known(state):
-        compare(witness, ACCEL_X, shown * LEAST_SHOWN, SCALE_DOUBT * LEAST_SHOWN)
-        still = state.scale_off != 0.0 and abs(by_wheels) > KEPT * SCALE_DOUBT
-        state.scale_off = by_wheels if still or abs(shown) > SCALE_DOUBT else 0.0
+    by_wheels, by_ground = moved_scale(wheels), _scale_by_ground(state, above)
+    if wheels.scale_s < FEWEST_SCALE_S or not _zero_known(state):
+        return
+    shown = lesser(by_wheels, moved_scale(torques))
+    shown = by_ground if abs(by_ground) > abs(shown) else shown
+    compare(witness, ACCEL_X, shown * LEAST_SHOWN, SCALE_DOUBT * LEAST_SHOWN)
+    still = state.scale_off != 0.0 and abs(by_wheels) > KEPT * SCALE_DOUBT
+    state.scale_off = by_wheels if still or abs(shown) > SCALE_DOUBT else 0.0
+    state.scale_beyond = math.copysign(max(abs(by_ground) - SOUND, 0.0), by_ground)
 
 
 @kernel
 def correct_accel(state: Record, reading: float) -> float:
     """Return the reading [m/s^2] less what zero and scale are known to have drifted by."""
-    return float((reading - state.zero_off) / (1.0 + state.scale_off))
+    scale = state.scale_off if state.scale_off != 0.0 else state.scale_beyond
+    return float((reading - state.zero_off) / (1.0 + scale))

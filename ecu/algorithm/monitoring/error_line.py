@@ -81,3 +81,11 @@ def moved_offset(line: Record) -> float:
 def moved_scale(line: Record) -> float:
     moved: float = line.now.scale - line.usual.scale
     return moved
+
+
+@kernel
+def lesser(one: float, other: float) -> float:
+    """Return the one of two values that is nearer to zero; 0 where their signs differ."""
+    if one * other <= 0.0:
+        return 0.0
+    return one if abs(one) < abs(other) else other

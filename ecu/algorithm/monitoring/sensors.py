@@ -19,7 +19,7 @@ from ecu.algorithm.monitoring.accel_error import (
 )
 from ecu.algorithm.monitoring.accel_timing import watch_timing
 from ecu.algorithm.monitoring.acceleration import watch_acceleration, wheels_deny
-from ecu.algorithm.monitoring.carried import OVER_GROUND
+from ecu.algorithm.monitoring.carried import OVER_GROUND, over_ground_confirmed
 from ecu.algorithm.monitoring.failed_brakes import watch_brakes
 from ecu.algorithm.monitoring.lateness import reference_lag
 from ecu.algorithm.monitoring.motors import (
@@ -41,6 +41,7 @@ from ecu.algorithm.monitoring.speeds import FOUND_S, SPEED, watch_speeds
 from ecu.algorithm.monitoring.turning import watch_turning
 from ecu.algorithm.monitoring.wheel_unit import watch_wheel_unit
 from ecu.algorithm.monitoring.witness import believe, leave_out, note_named, rejected_faults
+from ecu.algorithm.vehicle import tyre_slip
 from ecu.contract.faults import (
     ACCEL_IMPLAUSIBLE,
     BRAKE_FAILED,
@@ -76,10 +77,15 @@ def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
     base, slope = s.control.base, s.accel_error.wheels.usual.offset
     watch_acceleration(p, s.acceleration, s.witness, u, estimate, base, slope, braking, dt)
     watch_timing(s.accel_error.timing, s.acceleration, s.witness, u, dt)
+    speeds = s.speeds
+    heard = usable(u, VEHICLE_SPEED) and not s.witness.rejected[VEHICLE_SPEED]
+    above = speeds.apart[SPEED] if heard and not over_ground_confirmed(speeds.carried) else math.nan
     if s.witness.rejected[ACCEL_X]:
         s.accel_error.apart = 0.0  # it says nothing of motors either
     elif s.acceleration.time == 0.0:
-        follow_accel_error(p, s.accel_error, s.witness, s.acceleration, estimate.accel_y, braking)
+        above -= max(tyre_slip(p, estimate.accel_x), 0.0)
+        across = estimate.accel_y
+        follow_accel_error(p, s.accel_error, s.witness, s.acceleration, across, above, braking)
     if accel_doubted(s.accel_error):
         faults |= ACCEL_X_DRIFTED
     above = s.speeds.apart[SPEED] - s.speeds.base[SPEED] if usable(u, VEHICLE_SPEED) else math.nan
