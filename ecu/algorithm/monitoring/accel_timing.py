@@ -8,7 +8,7 @@ late     where the force of linings and motors has changed and is steady again, 
 of the blocks of `acceleration.py`, 0 before and 1 after the change. Each is over its own change, so neither
 friction, mass, slope nor the reading's zero and scale are in it; tyres and pitch take up to 0.035 s (all
 simulated cars). A reading that is late seems to be a lining that rubs less as the brakes come, and more as
-they go. It is left out until it is in time again.
+they go, and motors that give what they do not: these are believed again. It is left out until it is in time.
 """
 
 import math
@@ -17,8 +17,8 @@ import numpy as np
 
 from ecu.algorithm.inputs import fresh
 from ecu.algorithm.monitoring.acceleration import BLOCK_S, BLOCKS, ROLLED, A, F
-from ecu.algorithm.monitoring.witness import compare
-from ecu.contract.signals import ACCEL_X
+from ecu.algorithm.monitoring.witness import believe, compare
+from ecu.contract.signals import ACCEL_X, MOTOR_TORQUE
 from ecu.jit import Record, kernel
 
 ACCEL_TIMING_STATE = np.dtype(
@@ -84,6 +84,9 @@ def _follow_lag(state: Record, mean: Record, witness: Record) -> None:
     state.told = state.told + 1 if said else 0
     if state.told == (AGAIN if state.late else SURE):
         state.late, state.told = 1 - state.late, 0
+        for i in range(MOTOR_TORQUE, MOTOR_TORQUE + 4):
+            if state.late:
+                believe(witness, i)  # they were judged by it
 
 
 @kernel
@@ -93,7 +96,7 @@ def watch_timing(state: Record, blocks: Record, witness: Record, inputs: Record,
     Args:
         state: `ACCEL_TIMING_STATE`, overwritten.
         blocks: `ACCELERATION_STATE`.
-        witness: `WITNESS_STATE`; the accelerometer's fields are overwritten.
+        witness: `WITNESS_STATE`; the fields of accelerometer and motors are overwritten.
         inputs: `INPUTS` as received.
         dt: time since the last cycle [s].
     """

@@ -9,7 +9,7 @@ import pytest
 from ecu.algorithm.monitoring.accel_timing import ACCEL_TIMING_STATE, watch_timing
 from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE, ROLLED, A, F
 from ecu.algorithm.monitoring.witness import WITNESS_STATE
-from ecu.contract.signals import ACCEL_X
+from ecu.contract.signals import ACCEL_X, MOTOR_TORQUE
 
 DT = 0.01
 Series = Callable[[float], float]
@@ -97,6 +97,14 @@ def test_a_reading_is_late_where_it_follows_the_torques(feed, case, force, readi
 
 def test_nothing_is_said_where_the_torques_are_not_known(feed) -> None:
     assert Sensor(feed).drive(24.0, HARD, late(HARD, 0.2), known=False) is None
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.2])
+def test_motors_that_a_late_reading_has_accused_are_believed_again(feed, lag: float) -> None:
+    sensor = Sensor(feed)
+    sensor.witness["rejected"][MOTOR_TORQUE : MOTOR_TORQUE + 4] = 1
+    sensor.drive(8.0, HARD, late(HARD, lag))
+    assert sensor.witness["rejected"][MOTOR_TORQUE : MOTOR_TORQUE + 4].tolist() == [lag == 0.0] * 4
 
 
 def test_it_is_used_again_when_it_is_in_time(feed) -> None:
