@@ -246,3 +246,15 @@ def test_a_scale_that_grows_slowly_is_no_usual_one(params, feed, case, wrong, of
     car.drive(300.0, grows=True, **wrong)
     print(car.reported, car.state)
     assert -4.0 - correct_accel(car.state, -4.0) == pytest.approx(off, abs=0.06)
+
+
+def test_a_slope_that_begins_as_the_car_brakes_is_in_no_usual_scale(params, feed) -> None:
+    """While the brakes act it looks like a scale; once they are released it does not."""
+    usual = []
+    for slope in (0.0, -0.6):
+        car = Car(params, feed)
+        car.drive(7.0)
+        car.drive(17.0, slope=slope)
+        usual.append(float(car.state["wheels"]["usual"]["scale"]))
+    print(usual)
+    assert usual[1] == pytest.approx(usual[0], abs=0.015)

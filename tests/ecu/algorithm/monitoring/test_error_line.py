@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ecu.algorithm.monitoring.error_line import LINE_STATE, correct_line, sigma_line
+from ecu.algorithm.monitoring.error_line import LINE_STATE, correct_line, lesser, sigma_line
 
 NOISE = 0.2
 
@@ -24,3 +24,11 @@ def test_a_line_is_known_where_it_was_seen(seen, known: float, unknown: float) -
         print(h, sigma)
         assert least < sigma < most
         assert abs(line["offset"] + line["scale"] * h - (0.3 - 0.02 * h)) < 3.0 * sigma
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "shown"),
+    [(0.1, 0.3, 0.1), (0.3, 0.1, 0.1), (-0.3, -0.1, -0.1), (0.1, -0.3, 0.0), (0.0, 0.3, 0.0)],
+)
+def test_what_two_show_is_the_lesser_of_both(one: float, other: float, shown: float) -> None:
+    assert lesser(one, other) == shown
