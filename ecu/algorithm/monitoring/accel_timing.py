@@ -35,7 +35,7 @@ SAME_S, CHANGED = 0.6, 1.0  # s of blocks that are compared; m/s^2, of the wheel
 LEAST_CHANGE = 1.5  # m/s^2, of the force
 STEADY, SETTLED = 0.15, 4  # of the change; blocks after it
 FOLLOWS = 0.4  # of the change, what the reading has to show of it
-LATE, IN_TIME = 0.07, 0.035  # s
+LATE, IN_TIME = 0.07, 0.045  # s
 SURE, AGAIN = 2, 4  # blocks that say that it is late, and in time again
 RATE = 10.0  # m/s^3, of a force that changes: at it the innovation is published
 
@@ -65,6 +65,8 @@ def _lag(mean: Record) -> float:
     said = abs(change) > LEAST_CHANGE and abs(mean[BLOCKS - 1, F] - before) < 0.5 * steady
     for k in range(SETTLED):
         said = said and abs(mean[k, F] - after) < steady
+    # The linings' first force is in the reading before it counts as braking.
+    said = said and max(abs(mean[BLOCKS - 1, A] - first), abs(mean[0, A] - last)) < 0.5 * steady
     if not said or followed * change < FOLLOWS * change * change:
         return math.nan
     lag = 0.0
@@ -79,7 +81,7 @@ def _follow_lag(state: Record, mean: Record, witness: Record) -> None:
     lag = _lag(mean)
     if math.isnan(lag):
         return
-    compare(witness, ACCEL_X, lag * RATE, LATE * RATE)
+    compare(witness, ACCEL_X, max(lag, 0.0) * RATE, LATE * RATE)  # early ones: the pressures are late
     said = lag < IN_TIME if state.late else lag > LATE
     state.told = state.told + 1 if said else 0
     if state.told == (AGAIN if state.late else SURE):
