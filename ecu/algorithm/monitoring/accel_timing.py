@@ -6,7 +6,7 @@ late     where the force of linings and motors has changed and is steady again, 
     L = sum over 1.2 s of ((f - f_0) / (f_1 - f_0) - (a - a_0) / (a_1 - a_0)) 0.1 s
 
 of the blocks of `acceleration.py`, 0 before and 1 after the change. Each is over its own change, so neither
-friction, mass, slope nor the reading's zero and scale are in it; tyres and pitch take up to 0.035 s (all
+friction, mass, slope nor the reading's zero and scale are in it; tyres and pitch take up to 0.045 s (all
 simulated cars). A reading that is late seems to be a lining that rubs less as the brakes come, and more as
 they go, and motors that give what they do not: these are believed again. It is left out until it is in time.
 """
@@ -35,7 +35,7 @@ SAME_S, CHANGED = 0.6, 1.0  # s of blocks that are compared; m/s^2, of the wheel
 LEAST_CHANGE = 1.5  # m/s^2, of the force
 STEADY, SETTLED = 0.15, 4  # of the change; blocks after it
 FOLLOWS = 0.4  # of the change, what the reading has to show of it
-LATE, IN_TIME = 0.07, 0.045  # s
+LATE, IN_TIME = 0.07, 0.05  # s
 SURE, AGAIN = 2, 4  # blocks that say that it is late, and in time again
 RATE = 10.0  # m/s^3, of a force that changes: at it the innovation is published
 
