@@ -34,7 +34,7 @@ ROLLING: Final = 24  # ln of all rolling radii: observable by a speed reference 
 RATE: Final = 25  # change of CHANGE, of both axles [1/s]
 CHANGE: Final = 26  # two: ln of an axle's friction over its level, within an application
 SLIP_ERROR: Final = 28  # two: of an axle's slip, by unreported drive; only considered
-SIDE: Final = 30  # ln of the stiffness of the left tyres over the right ones; only considered
+SIDE: Final = 30  # ln of the left tyres' stiffness over the right ones'; considered, or of the road
 PEAK_LOAD: Final = 31  # exponent of peak adhesion over load, beyond the usual; only considered
 OVERRUN: Final = 34  # unreported engine drag while braking, over mass [m/s^2]
 MEAN: Final = 32  # two: mean of CHANGE over this application, weighted by pressure
@@ -153,11 +153,8 @@ JOINT_STATE: Final = np.dtype(
         ("observed", "u1", (4,)),  # friction was corrected in the last window
         ("sigma_force", "f8"),  # of the force of all linings at equal pressures, relative
         ("ratio", "f8", (RATIOS,)),  # squared innovations over their variances
-        (
-            "signed_ratio",
-            "f8",
-            (4,),
-        ),  # test ratio up to the gate, with the sign of the innovation
+        ("signed_ratio", "f8", (4,)),  # test ratio up to the gate, with the sign of the innovation
+        ("uneven", "f8", (2,)),  # per axle: of the left wheel less of the right one, in gates, summed
         ("at_bound", "u1"),  # a learned state is at its bound
         ("reversing", "u1"),
         ("reset", "u1"),

@@ -41,6 +41,7 @@ from ecu.algorithm.estimation.joint.layout import (
     RATIO,
     RATIOS,
     ROLLING,
+    SIDE,
     SLOPE,
     STIFFNESS,
     N,
@@ -55,7 +56,7 @@ from ecu.algorithm.estimation.joint.prior import (
     walk,
 )
 from ecu.algorithm.estimation.joint.reference import correct_by_reference
-from ecu.algorithm.estimation.joint.sliding import HOLD_S, share_force, watch_tyres
+from ecu.algorithm.estimation.joint.sliding import HOLD_S, share_force, watch_sides, watch_tyres
 from ecu.algorithm.estimation.joint.snapshot import restore_snapshot, save_newer_snapshot, save_snapshots
 from ecu.algorithm.estimation.joint.speed import (
     DRIVEN_ACCEL,
@@ -77,11 +78,7 @@ from ecu.algorithm.inputs import (
     requested_decel,
     usable,
 )
-from ecu.contract.signals import (
-    ACCEL_X,
-    CALLIPER_PRESSURE,
-    WHEEL_SPEED,
-)
+from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
 WINDOW_S = 0.05
@@ -161,6 +158,7 @@ def _choose_free(state: Record, braking: bool, motors: bool, learning: bool) -> 
         return
     if braking:
         free[STIFFNESS] = free[PEAK] = free[OVERRUN] = 1
+        free[SIDE] = 1 if state.x[SIDE] != 0.0 else 0
     else:
         free[BIAS] = free[DRAG] = 1 if state.window.motor_reported and state.drive_known > KNOWN else 0
         if motors:
@@ -306,6 +304,7 @@ def _fuse(params: Record, state: Record, inputs: Record, braking: bool) -> None:
         if weight > 4.0 * APPLIED:
             note_change(state, weight)
     watch_tyres(state, learning and braking)
+    watch_sides(state, learning and braking and abs(w.across) < STRAIGHT)
     if no_wheel_known(inputs):
         state.free[OVERRUN] = 0  # the wheels' slip tells it from the linings
         seen = linings_tell(params, state, braking)

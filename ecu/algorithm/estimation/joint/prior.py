@@ -75,7 +75,7 @@ UNKNOWN_SLIP, UNKNOWN_SLIP_REST, UNKNOWN_SLIP_BY_ACCEL = 0.003, 0.005, 0.1
 UNKNOWN_SLIP_S = 2.0  # after which its value is independent
 
 LASTING = np.array(
-    [STIFFNESS, RATIO, BIAS, MASS, PEAK, LOAD, DEFLECTION_GAIN, DRAG, ROLLING, DELAY, SIDE, PEAK_LOAD]
+    [STIFFNESS, RATIO, BIAS, MASS, PEAK, LOAD, DEFLECTION_GAIN, DRAG, ROLLING, DELAY, PEAK_LOAD]
 )
 """States whose variance never grows with time beyond that of the prior."""
 
@@ -149,6 +149,13 @@ def derive_axles(state: Record) -> None:
 
 
 @kernel
+def _forget_road(state: Record) -> None:
+    """Reset what a road takes from the tyres of one side: the next one is another."""
+    if state.x[SIDE] != 0.0:
+        clear_state(state, SIDE, PRIOR[SIDE] ** 2)
+
+
+@kernel
 def begin_application(state: Record, heat: Record) -> None:
     """Widen the levels by their change since the last application, and start with friction at its level.
 
@@ -173,6 +180,7 @@ def begin_application(state: Record, heat: Record) -> None:
         clear_state(state, MEAN + axle, 0.0)
     p[CHANGE, CHANGE + 1] = p[CHANGE + 1, CHANGE] = CHANGE_COMMON**2
     state.weight = 0.0
+    _forget_road(state)
     forget_rate(state)
     if unknown <= 0.0:
         clear_state(state, OVERRUN, 0.0)
@@ -204,6 +212,7 @@ def end_application(state: Record) -> None:
         clear_state(state, CHANGE + axle, 0.0)
         clear_state(state, MEAN + axle, 0.0)
     clear_state(state, RATE, 0.0)
+    _forget_road(state)
 
 
 @kernel

@@ -1,8 +1,10 @@
-"""Wheels beyond the linear range of their tyres: suspended learning and restored states."""
+"""Wheels beyond the range of their tyres or on another road: suspended learning and restored states."""
+
+import math
 
 from ecu.algorithm.estimation.joint.kalman import GATE, forget
-from ecu.algorithm.estimation.joint.layout import STIFFNESS, V
-from ecu.algorithm.estimation.joint.prior import PRIOR
+from ecu.algorithm.estimation.joint.layout import LEVEL, SIDE, STIFFNESS, V
+from ecu.algorithm.estimation.joint.prior import LEVEL_WHEEL, PRIOR
 from ecu.algorithm.estimation.joint.snapshot import restore_snapshot
 from ecu.algorithm.estimation.joint.wheel import car_force
 from ecu.algorithm.inputs import fresh
@@ -15,6 +17,8 @@ AGREEING = 0.05  # slip within which a wheel confirms a speed
 SLIDING_FLOOR = 5.0  # m/s, least reference speed of that slip
 HOLD_S = 0.2
 OTHER_TYRES = 2.5  # wheels on the gate at once
+UNEVEN, UNEVEN_S = 0.7, 0.5  # squared gates, summed over this time [s], at both axles to the same side
+UNEVEN_SIGMA = 0.2  # of SIDE on such a road
 
 
 @kernel
@@ -76,3 +80,37 @@ def suspend_learning(state: Record) -> None:
     if state.hold_s <= 0.0:
         restore_snapshot(state)
     state.hold_s = HOLD_S
+
+
+@kernel
+def side_share(side: float, i: int) -> float:
+    """Return the derivative of the logarithm of a tyre's stiffness by SIDE.
+
+    The road takes from the side that has less; before one is seen, SIDE is the tyres' own.
+    """
+    left = i % 2 == 0
+    if side == 0.0:
+        return 0.5 if left else -0.5
+    if left:
+        return 1.0 if side < 0.0 else 0.0
+    return -1.0 if side > 0.0 else 0.0
+
+
+@kernel
+def watch_sides(state: Record, observing: bool) -> None:
+    """Restore friction and learn what the road takes where one side's wheels alone contradict the tyres.
+
+    Each braked wheel of a road that grips less on one side slips more at equal torque. Linings may differ
+    likewise until it is known by how much; that does not change at once.
+    """
+    p, ratio, uneven = state.p, state.signed_ratio, state.uneven
+    for left in (0, 2):
+        i, j, axle = LEVEL + left, LEVEL + left + 1, left // 2
+        known = p[i, i] + p[j, j] - 2.0 * p[i, j] < 0.5 * LEVEL_WHEEL**2
+        apart = (ratio[left] - ratio[left + 1]) / (GATE * GATE) if observing and known else 0.0
+        uneven[axle] = (1.0 - state.window.time / UNEVEN_S) * uneven[axle] + apart
+    if min(abs(uneven[0]), abs(uneven[1])) > UNEVEN and uneven[0] * uneven[1] > 0.0:
+        restore_snapshot(state)
+        forget(state, SIDE, UNEVEN_SIGMA**2)
+        state.x[SIDE] = math.copysign(0.5 * UNEVEN_SIGMA, uneven[0])
+        uneven[0] = uneven[1] = 0.0

@@ -35,7 +35,7 @@ from ecu.algorithm.estimation.joint.layout import (
     V,
 )
 from ecu.algorithm.estimation.joint.noise import motor_variance, skew
-from ecu.algorithm.estimation.joint.sliding import wheel_slides
+from ecu.algorithm.estimation.joint.sliding import side_share, wheel_slides
 from ecu.algorithm.estimation.joint.wheel import (
     APPLIED,
     LEAST_OF_PEAK,
@@ -82,7 +82,8 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     log_relative = math.log(relative)
     exponent = params.stiffness_degression[i] + x[LOAD]
     rear = x[RATIO] if i >= 2 else 0.0
-    side = 0.5 * x[SIDE] if i % 2 == 0 else -0.5 * x[SIDE]
+    by_side = side_share(x[SIDE], i)
+    side = by_side * x[SIDE]
     stiffness = params.slip_stiffness[i] * math.exp(x[STIFFNESS] + rear + side) * relative**-exponent
     peak = peak_adhesion(state, relative)
     used = force * scale
@@ -113,7 +114,7 @@ def predict_wheel(params: Record, state: Record, i: int, ground: float) -> float
     h[LOAD] = by_slip * slip * log_relative
     h[PEAK] = by_slip * by_peak / max(1.0 - 4.0 * x[PEAK], LEAST_OF_PEAK)
     h[PEAK_LOAD] = by_slip * by_peak * log_relative
-    h[SIDE] = -by_slip * slip * (0.5 if i % 2 == 0 else -0.5)
+    h[SIDE] = -by_slip * slip * by_side
     h[SLIP_ERROR + i // 2] = by_slip
     h[RADIUS + i] = h[ROLLING] = -omega - by_slip * slope * used  # a larger wheel needs less force
     h[DEFLECTION_GAIN] = h[RADIUS + i] * deflection_gain / r

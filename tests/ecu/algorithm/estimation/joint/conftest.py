@@ -48,7 +48,7 @@ class Car:
         self.speed: float = true.pop("speed", 30.0)
         self.mu = np.broadcast_to(true.pop("mu", 0.45), 4).copy()
         self.mass = self.params["mass"] * true.pop("mass", 1.0)
-        self.stiffness: float = true.pop("stiffness", 1.0)
+        self.stiffness: Any = true.pop("stiffness", 1.0)
         names = ("wheel_speed", "pressure", "accel", "vehicle_speed")
         quiet = true.pop("quiet", False)
         self.sigma = {name: 0.0 if quiet else float(self.params[f"sigma_{name}"]) for name in names}

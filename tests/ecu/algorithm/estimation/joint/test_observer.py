@@ -2,13 +2,14 @@
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
-from ecu.algorithm.estimation.joint.layout import CHANGE, LEVEL, MASS, RATE, SLOPE, STIFFNESS, N, V
+from ecu.algorithm.estimation.joint.layout import CHANGE, LEVEL, MASS, RATE, SIDE, SLOPE, STIFFNESS, N, V
 from ecu.algorithm.estimation.joint.observer import WINDOW_S
-from ecu.algorithm.estimation.joint.prior import CHANGE_S, set_prior
+from ecu.algorithm.estimation.joint.prior import CHANGE_S, PRIOR, set_prior
 from ecu.algorithm.estimation.joint.sliding import HOLD_S
 from ecu.contract.signals import (
     ABS_ACTIVE,
@@ -230,6 +231,58 @@ def test_another_tyre_is_not_taken_for_another_friction(new_car, factor: float, 
     assert learned == pytest.approx(factor, rel=0.06)
     assert off.max() < 0.06
     assert off[-1] < 0.02
+
+
+def after_brakings(new_car, stiffness: Any, seed: int = 0) -> Any:
+    """Return a car in its third brake application, tyres of another stiffness from now on."""
+    car = new_car(seed=seed, speed=60.0)
+    for _ in range(3):
+        car.drive(0.5)
+        car.drive(1.0, **BRAKING)
+    car.stiffness = np.array(stiffness)
+    return car
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("share", [0.5, 0.6, 0.7])
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_road_that_grips_less_on_one_side_is_not_taken_for_friction(new_car, side, share, seed) -> None:
+    """Both wheels of that side slip more at equal torque, and nothing is said of the other side's tyres."""
+    road = np.ones(4)
+    road[side::2] = share
+    rows = [
+        [(mu, float(car.state["x"][STIFFNESS])) for _, mu in history(car, 1.5, **BRAKING)]
+        for car in (after_brakings(new_car, tyres, seed) for tyres in (np.ones(4), road))
+    ]
+    off = np.array([np.abs(other / own - 1).max() for (own, _), (other, _) in zip(*rows, strict=True)])
+    print(f"{share}, seed {seed}: friction off {off.max():.3f}, last {off[-1]:.3f}")
+    assert off.max() < 0.06
+    assert off[-1] < 0.03
+    assert rows[1][-1][1] == pytest.approx(rows[0][-1][1], abs=0.03)
+
+
+@pytest.mark.parametrize("wheels", [(3,), (0, 3), (0, 1)])
+def test_a_rear_tyre_a_diagonal_and_an_axle_are_no_road(new_car, wheels: tuple[int, ...]) -> None:
+    tyres = np.ones(4)
+    tyres[list(wheels)] = 0.7
+    car = after_brakings(new_car, tyres)
+    assert all(state["x"][SIDE] == 0.0 for state in car.cycles(1.5, **BRAKING))
+
+
+def test_linings_that_differ_from_side_to_side_are_no_road(new_car) -> None:
+    """As unequal as at the first brake application of a car that nobody knows: by a fifth."""
+    car = new_car(speed=38.0, mu=0.45 * np.array([0.9, 1.1, 0.9, 1.1]))
+    car.drive(1.0)
+    state = car.drive(2.0, **BRAKING)
+    assert state["x"][SIDE] == 0.0
+    assert friction(state)[1::2] / friction(state)[::2] == pytest.approx(1.1 / 0.9, abs=0.08)
+
+
+def test_another_road_is_the_brake_applications_own(new_car) -> None:
+    car = after_brakings(new_car, [0.7, 1.0, 0.7, 1.0])
+    assert car.drive(1.0, **BRAKING)["x"][SIDE] == pytest.approx(math.log(0.7), abs=0.05)
+    state = car.drive(0.5)
+    assert (state["x"][SIDE], state["p"][SIDE, SIDE]) == (0.0, PRIOR[SIDE] ** 2)
 
 
 STIFFER = [1.2, 1.3, 1.4]

@@ -14,6 +14,7 @@ from ecu.algorithm.estimation.joint.layout import (
     OFFSET,
     OVERRUN,
     RATE,
+    SIDE,
     N,
 )
 from ecu.algorithm.estimation.joint.prior import (
@@ -91,8 +92,9 @@ def test_an_application_begins_at_the_level_as_sure_as_last_time_less_a_step(
     state["drive_known"] = known
     P, x = state["p"].copy(), state["x"].copy()
     P[np.ix_(LEVELS, LEVELS)] += shared(STEP_COMMON, STEP_AXLE, STEP_WHEEL) + np.outer(heat, heat)
-    anew = [*CHANGES, *MEANS, RATE, *DRIVES]
+    anew = [*CHANGES, *MEANS, RATE, *DRIVES, SIDE]
     P[anew], P[:, anew], x[anew] = 0.0, 0.0, 0.0
+    P[SIDE, SIDE] = PRIOR[SIDE] ** 2
     P[np.ix_(CHANGES, CHANGES)] = CHANGE_COMMON**2 + CHANGE_AXLE**2 * np.eye(2)
     P[RATE, RATE] = (RATE_SIGMA * known) ** 2
     P[DRIVES, DRIVES] = drive**2
@@ -177,8 +179,9 @@ def test_an_application_ends_with_the_mean_in_the_level() -> None:
         K = P[:, m] / (P[m, m] + MEAN_ZERO**2) * freed
         A = np.eye(N) - np.outer(K, np.eye(N)[m])
         x, P = x - K * x[m], A @ P @ A.T + MEAN_ZERO**2 * np.outer(K, K)
-    gone = [*CHANGES, *MEANS, RATE]
+    gone = [*CHANGES, *MEANS, RATE, SIDE]
     P[gone], P[:, gone], x[gone] = 0.0, 0.0, 0.0
+    P[SIDE, SIDE] = PRIOR[SIDE] ** 2
     end_application(state)
     np.testing.assert_allclose(state["x"], x, rtol=1e-10)
     np.testing.assert_allclose(state["p"], P, rtol=1e-8, atol=1e-12)
