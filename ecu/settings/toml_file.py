@@ -3,8 +3,7 @@
 import os
 import stat
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
-from itertools import zip_longest
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple, get_args, get_origin
 
@@ -86,15 +85,12 @@ def findings(
     `file_of` names the file of a key; `model` is what was validated: its keys and units are named.
     """
     found = sorted(error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden")
-    return [
-        UserError(file_of(one["loc"]), ".".join(_counted(one["loc"])), _remedy(one, model)) for one in found
-    ]
+    return [UserError(file_of(one["loc"]), _place(one["loc"]), _remedy(one, model)) for one in found]
 
 
-def _counted(place: tuple[int | str, ...]) -> Iterator[str]:
-    """Yield the parts of a place, tables of one name numbered from 1."""
-    for part, inner in zip_longest(place, place[1:]):
-        yield str(part + 1 if isinstance(part, int) and isinstance(inner, str) else part)
+def _place(loc: tuple[int | str, ...]) -> str:
+    """Return the name of a key; tables of one name, and values of a list, are numbered from 1."""
+    return ".".join(str(part + 1 if isinstance(part, int) else part) for part in loc)
 
 
 def _remedy(finding: Any, model: type[BaseModel]) -> str:

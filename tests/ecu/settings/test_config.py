@@ -175,9 +175,9 @@ WRONG = [
     (
         "a pedal to 1000 %",
         change("control.pedal_position", "[0,5,20,40,60,80,1000]"),
-        ["pedal_position.6", "100"],
+        ["pedal_position.7", "100"],
     ),
-    ("a pedal for 1e9", change("control.pedal_decel", "[0,0,1,2,4,6,1e9]"), ["pedal_decel.6", "at most 12"]),
+    ("a pedal for 1e9", change("control.pedal_decel", "[0,0,1,2,4,6,1e9]"), ["pedal_decel.7", "at most 12"]),
     (
         "a pedal that is a switch",
         change("control.pedal_decel", "[0,5.1,6,7,8,9,10]"),
