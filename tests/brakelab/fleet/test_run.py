@@ -12,10 +12,12 @@ import pytest
 from brakelab.fleet.cluster import Workers
 from brakelab.fleet.job import Job, Outcome, metadata_of
 from brakelab.fleet.manifest import VehicleDrive
+from brakelab.fleet.output import brakes_file, keep, others
 from brakelab.fleet.run import TRIES, Chain, Planned, run_fleet
 from brakelab.replay.source import load_source
 from brakelab.results.files import brakes_table
-from ecu.errors import RunFault
+from brakelab.results.outputs import unfinished
+from ecu.errors import RunFault, UserError
 from ecu.settings.config import load_config
 from ecu.settings.resources import resource
 
@@ -178,3 +180,16 @@ def test_a_scheduler_that_is_lost_is_one_line(tmp_path: Path) -> None:
 
     with pytest.raises(RunFault, match="the Dask scheduler was lost"):
         run(Workers(Lost(), lambda: 1, Died), fleet(a="1"), tmp_path, noting())
+
+
+def test_a_drive_s_file_is_whole_or_not_there(tmp_path: Path) -> None:
+    """What a killed run left unfinished is nobody's drive."""
+    outcome = Outcome({"vehicle": "a", "drive": "one", "fault": ""}, b"all of it", b"")
+    path = brakes_file(tmp_path, "a", "one")
+    keep(tmp_path, outcome)
+    assert path.read_bytes() == b"all of it"
+    unfinished(path).write_bytes(b"half")
+    assert list(others(tmp_path, set())) == [path]
+    (tmp_path / "full").write_text("no folder")
+    with pytest.raises(UserError, match="cannot be written"):
+        keep(tmp_path / "full", outcome)

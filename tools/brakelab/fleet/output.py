@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from brakelab.fleet.job import Job, Outcome, outcome_of
+from brakelab.results.outputs import whole
 
 
 def brakes_file(out: Path, vehicle: str, drive: str) -> Path:
@@ -54,15 +55,10 @@ def keep(out: Path, outcome: Outcome) -> None:
         for written in (rows_file(out, *names), page_file(out, *names)):
             written.unlink(missing_ok=True)
         return
-    unfinished = path.with_name(f".{path.name}.unfinished")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        unfinished.write_bytes(outcome.file)
-        unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with whole(path) as part:
+        part.write_bytes(outcome.file)
 
 
 def others(out: Path, wanted: set[Path]) -> Iterator[Path]:
     """Yield the files of brake applications that are none of `wanted`."""
-    yield from (path for path in sorted(out.glob("brakes/vehicle=*/*.parquet")) if path not in wanted)
+    yield from (path for path in sorted(out.glob("brakes/vehicle=*/[!.]*.parquet")) if path not in wanted)

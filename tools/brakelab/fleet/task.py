@@ -25,6 +25,7 @@ from brakelab.replay.quality import quality_lines
 from brakelab.results.car import KEY as CAR
 from brakelab.results.car import car_of
 from brakelab.results.files import ResultWriter, brakes_table
+from brakelab.results.outputs import whole
 from brakelab.results.pads import pads_of
 from ecu.algorithm.step import new_state
 from ecu.contract.records import LEARNED
@@ -132,10 +133,8 @@ def _draw_page(rows: Path, target: Path) -> None:
 
 def _put(file: Path, target: Path) -> None:
     """Write `file` to `target` atomically."""
-    unfinished = target.with_name(f".{target.name}.unfinished")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(file, unfinished)
-    unfinished.replace(target)
+    with whole(target) as part:
+        shutil.copyfile(file, part)
 
 
 def _by_address(text: str, paths: Sequence[Path], urls: Sequence[str]) -> str:
