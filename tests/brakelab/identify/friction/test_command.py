@@ -120,7 +120,7 @@ def test_found_terms_are_written_and_judged_as_a_law(
     assert found.code == str(terms)
     stops = find_stops(recording, columns, "x")
     constant = read_file(out, Linings).lining["mine"].friction["constant"]
-    errors = [error_of(law, lining.brake, stops, False, closed=True) for law in (found, constant)]
+    errors = [error_of(law, lining.brake, stops, closed=True) for law in (found, constant)]
     assert errors[0] < 0.7 * errors[1]
 
 
@@ -220,9 +220,8 @@ def test_a_law_is_judged_as_it_is_used(
 ) -> None:
     """Ostermeyer's is fitted from the friction that each stop began with, which a car does not measure."""
 
-    def error(law: Law, brake: RigBrake, judged: Stops, starts_at_measured: bool, closed: bool) -> float:
+    def error(law: Law, brake: RigBrake, judged: Stops, closed: bool) -> float:
         assert closed
-        assert not starts_at_measured
         return 3.0 if len(judged) == len(stops) else 4.0
 
     monkeypatch.setattr(choice, "error_of", error)
@@ -234,7 +233,7 @@ def test_a_law_is_judged_as_it_is_used(
 def test_a_programme_that_is_given_decides_alone(stops: Stops, columns: Columns) -> None:
     seen, unseen = hottest(stops)
     found = judge(Job("constant", columns.brake, seen, unseen, ()))
-    assert found.overall == found.held_out == error_of(found.law, columns.brake, unseen, False, closed=True)
+    assert found.overall == found.held_out == error_of(found.law, columns.brake, unseen, closed=True)
 
 
 def test_held_out_are_the_hottest(stops: Stops) -> None:

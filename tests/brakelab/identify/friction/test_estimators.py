@@ -108,9 +108,9 @@ def test_the_network_is_a_law_that_runs_in_closed_loop(stops: Stops, columns: Co
     for name in ("constant", "network"):
         candidate = named(name, seen, columns)
         fitted = fit(candidate, columns.brake, seen)
-        errors[name] = error_of(fitted.law, columns.brake, unseen, False, closed=True)
+        errors[name] = error_of(fitted.law, columns.brake, unseen, closed=True)
         again = refit(fitted, columns.brake, unseen)
-        assert error_of(again, columns.brake, unseen, False) <= errors[name]
+        assert error_of(again, columns.brake, unseen) <= errors[name]
     print(errors)
     assert errors["network"] < 0.7 * errors["constant"]
     assert 1 <= fitted.agreed <= fitted.tried == 4

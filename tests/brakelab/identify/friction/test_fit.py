@@ -73,7 +73,7 @@ def test_a_constant_is_the_mean(stops: Stops, columns: Columns) -> None:
     fitted = fit(named("constant", stops, columns), columns.brake, stops)
     assert fitted.values[0] == pytest.approx(stops.mu.mean(), abs=1e-5)
     error = 100.0 * np.std(stops.mu) / stops.mu.mean()
-    assert error_of(fitted.law, columns.brake, stops, False) == pytest.approx(error, rel=1e-6)
+    assert error_of(fitted.law, columns.brake, stops) == pytest.approx(error, rel=1e-6)
 
 
 def test_ostermeyer_replayed_settles_where_it_must(stops: Stops, columns: Columns) -> None:

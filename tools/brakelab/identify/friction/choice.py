@@ -130,9 +130,9 @@ def judge(job: Job) -> Judged:
         law = refit(fitted, job.brake, seen)
     else:
         law, unseen = fitted.law, job.unseen
-    overall = held_out = error_of(law, job.brake, unseen, False, closed=True)
+    overall = held_out = error_of(law, job.brake, unseen, closed=True)
     if job.unseen is None:
-        every = error_of(fitted.law, job.brake, job.stops, False, closed=True)
+        every = error_of(fitted.law, job.brake, job.stops, closed=True)
         overall = float(np.sqrt((1.0 - HELD_OUT) * every**2 + HELD_OUT * held_out**2))
     return Judged(
         candidate.name,

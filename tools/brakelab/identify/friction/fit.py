@@ -141,11 +141,9 @@ def replayed(
     return np.nan_to_num(np.clip(means, -LOST, LOST), nan=LOST)
 
 
-def error_of(
-    law: Law, brake: RigBrake, stops: Stops, starts_at_measured: bool, closed: bool = False
-) -> float:
+def error_of(law: Law, brake: RigBrake, stops: Stops, closed: bool = False) -> float:
     """Return the nRMSE [%]: RMS of all blocks over their mean friction; see `replayed`."""
-    off = replayed(law, brake, stops, starts_at_measured, closed) - stops.mu
+    off = replayed(law, brake, stops, starts_at_measured=False, closed=closed) - stops.mu
     return 100.0 * float(np.sqrt(np.mean(off**2)) / np.mean(stops.mu))
 
 
