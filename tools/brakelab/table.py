@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.results.chart import BLUE, GREEN, ORANGE, PINK, Line, Panel, chart_svg
+from brakelab.results.chart import BLUE, GREEN, ORANGE, PINK, Line, Panel, chart_svg, ends_of
 from brakelab.results.outputs import write_text
 from ecu.contract.signals import CORNERS, OUTPUT_SIGNALS, column_names
 from ecu.errors import UserError, closest
@@ -85,8 +85,8 @@ class Table:
                 Line(along, self._number(one), colour)
                 for one, (_, colour) in zip(curves, _COLOURS, strict=False)
             ]
-            ends = _ends(np.concatenate([line.y for line in lines]), 0.05)
-            panels.append(Panel(self._with_unit(name), self._with_unit(x), _ends(along, 0.0), ends, lines))
+            axes = ends_of(along, margin=0.0), ends_of(*(line.y for line in lines), margin=0.05)
+            panels.append(Panel(self._with_unit(name), self._with_unit(x), *axes, lines))
         across = min(max(columns, 1), len(panels))
         return Picture(chart_svg(panels, _COLOURS if wheels else (), across), across)
 
@@ -183,14 +183,6 @@ class Listing(Table):
         rows = zip(*(column.tolist() for column in self.columns.values()), strict=True)
         shown = [[f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row] for row in rows]
         return _html(self, [*self.columns], shown)
-
-
-def _ends(values: NDArray[np.float64], margin: float) -> tuple[float, float]:
-    """Return the ends of an axis, beyond the values by a `margin` of what they span."""
-    known = values[np.isfinite(values)]
-    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
-    beyond = margin * (high - low) if high > low else 0.5 * max(abs(low), 1.0)
-    return low - beyond, high + beyond
 
 
 def _html(table: Table, head: list[str], rows: list[list[str]]) -> str:

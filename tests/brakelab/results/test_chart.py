@@ -5,8 +5,21 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+import pytest
 
-from brakelab.results.chart import BLUE, HEIGHT, LEFT, SCALE, TOP, WIDTH, Cells, Line, Panel, write_chart
+from brakelab.results.chart import (
+    BLUE,
+    HEIGHT,
+    LEFT,
+    SCALE,
+    TOP,
+    WIDTH,
+    Cells,
+    Line,
+    Panel,
+    ends_of,
+    write_chart,
+)
 
 
 def drawn(tmp_path: Path, panel: Panel) -> str:
@@ -29,6 +42,14 @@ def test_marks_and_lines_lie_where_their_numbers_are(tmp_path: Path) -> None:
     assert marks is not None
     assert re.findall(r"[\d.]+,[\d.]+", line[1]) == [f"{a:.1f},{b:.1f}" for a, b in expected]
     assert re.findall(r"M([\d.]+ [\d.]+)h0", marks[1]) == [f"{a:.1f} {b:.1f}" for a, b in expected]
+
+
+def test_an_axis_goes_a_little_beyond_all_that_is_known() -> None:
+    some, others = np.array([1.0, np.nan, 3.0]), np.array([2.0, 11.0, np.inf])
+    assert ends_of(some, others) == pytest.approx((0.6, 11.4))
+    assert ends_of(some, others, margin=0.0, shown=(50.0, 100.0)) == (2.5, 11.0)
+    assert ends_of(np.full(3, 4.0)) == (2.0, 6.0)
+    assert ends_of(np.array([np.nan])) == pytest.approx((-0.04, 1.04))
 
 
 def test_cells_have_the_colour_of_their_value(tmp_path: Path) -> None:

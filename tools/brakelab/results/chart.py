@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.errors import UserError
+from brakelab.results.outputs import write_text
 
 WIDTH, HEIGHT = 330.0, 180.0  # of a panel's inside
 LEFT, TOP, GAP_X, GAP_Y = 48.0, 52.0, 64.0, 66.0
@@ -62,6 +62,17 @@ def _colour(share: float) -> str:
     below = min(int(place), len(SCALE) - 2)
     mixed = (a + (place - below) * (b - a) for a, b in zip(SCALE[below], SCALE[below + 1], strict=True))
     return "#" + "".join(f"{round(part):02x}" for part in mixed)
+
+
+def ends_of(
+    *values: NDArray[np.float64], margin: float = 0.04, shown: tuple[float, float] = (0.0, 100.0)
+) -> tuple[float, float]:
+    """Return the ends of an axis: percentiles `shown` of all values, and a `margin` of their span beyond."""
+    every = np.concatenate(values)
+    known = every[np.isfinite(every)]
+    low, high = np.percentile(known, shown).tolist() if len(known) else (0.0, 1.0)
+    beyond = margin * (high - low) if high > low else 0.5 * max(abs(low), 1.0)
+    return low - beyond, high + beyond
 
 
 def _ticks(low: float, high: float) -> NDArray[np.float64]:
@@ -161,7 +172,7 @@ def write_chart(
         UserError: the file cannot be written.
     """
     if path.parent.is_dir():
-        _write(path, chart_svg(panels, legend, columns))
+        write_text(path, chart_svg(panels, legend, columns))
 
 
 def svg(width: float, height: float, body: Sequence[str]) -> str:
@@ -181,11 +192,4 @@ def write_svg(path: Path, width: float, height: float, body: Sequence[str]) -> N
     Raises:
         UserError: the file cannot be written.
     """
-    _write(path, svg(width, height, body))
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UserError(str(path), "", f"cannot be written ({error.strerror}); make it writable") from None
+    write_text(path, svg(width, height, body))

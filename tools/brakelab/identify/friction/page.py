@@ -11,9 +11,9 @@ from brakelab.arrays import Vector
 from brakelab.identify.friction.choice import Identified
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.fit import replayed
-from brakelab.identify.friction.sheet import ends_of, html_of, scrolling, write_sheet
+from brakelab.identify.friction.sheet import html_of, scrolling, write_sheet
 from brakelab.identify.friction.stops import Stops
-from brakelab.results.chart import BLUE, GREY, ORANGE, Line, Panel, chart_svg
+from brakelab.results.chart import BLUE, GREY, ORANGE, Line, Panel, chart_svg, ends_of
 from brakelab.results.text_table import Table
 
 MOST_POINTS: Final = 1500  # points of a chart

@@ -10,8 +10,8 @@ import numpy as np
 from brakelab.arrays import Vector
 from brakelab.identify.friction.report_tables import Measured, varies_pressure, varies_temperature
 from brakelab.identify.friction.sections import MARKS, Part
-from brakelab.identify.friction.sheet import ends_of, html_of, scrolling, write_sheet
-from brakelab.results.chart import BLUE, GREEN, ORANGE, PINK, Line, Panel, chart_svg
+from brakelab.identify.friction.sheet import html_of, scrolling, write_sheet
+from brakelab.results.chart import BLUE, GREEN, ORANGE, PINK, Line, Panel, chart_svg, ends_of
 from brakelab.results.text_table import Table
 
 COLOURS: Final = (BLUE, ORANGE, GREEN, PINK, "#333")

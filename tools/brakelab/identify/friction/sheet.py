@@ -6,9 +6,6 @@ from html import escape
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
-from brakelab.arrays import Vector
 from brakelab.results.outputs import write_text
 from brakelab.results.text_table import Table
 
@@ -34,13 +31,6 @@ def write_sheet(path: Path, title: str, body: Sequence[str]) -> None:
         f'<meta name="color-scheme" content="light dark"><style>{STYLE}</style>'
     )
     write_text(path, f"{head}<body>{''.join(body)}</body></html>\n")
-
-
-def ends_of(*values: Vector) -> tuple[float, float]:
-    """Return the ends of an axis that shows all `values`."""
-    low, high = (float(end) for end in (np.min(np.concatenate(values)), np.max(np.concatenate(values))))
-    edge = 0.04 * max(high - low, 1e-9)
-    return low - edge, high + edge
 
 
 def scrolling(wide: str) -> str:

@@ -1,22 +1,24 @@
 """Page of an identification: tables of what was identified and what was not, and how good the fits are."""
 
 from collections.abc import Sequence
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from brakelab.arrays import Vector
 from brakelab.identify.vehicle.model import Place, motion, stiffness_of
 from brakelab.identify.vehicle.parameters import Parameter
 from brakelab.identify.vehicle.solve import Identified
-from brakelab.results.chart import BLUE, ORANGE, PINK, Line, Panel, write_chart
+from brakelab.results.chart import BLUE, ORANGE, PINK, Line, Panel, ends_of, write_chart
 from brakelab.results.text_table import Table, markdown
 from ecu.contract.params import GRAVITY
 
 SPEEDS: Final = (3.0, 8.0, 14.0, 20.0, 26.0, 32.0, 45.0)  # m/s, of the table of overrun
 FEWEST_WINDOWS: Final = 4  # windows of a speed
+SHOWN: Final = (1.0, 99.0)  # percentiles that an axis shows of windows
+_ends = partial(ends_of, margin=0.08)
 
 
 def fitted_table(parameters: Sequence[Parameter]) -> Table:
@@ -82,15 +84,6 @@ def overrun_table(found: Identified, params: Any) -> Table:
     )  # fmt: skip
 
 
-def _ends(values: Vector, low: float = 1.0, high: float = 99.0) -> tuple[float, float]:
-    known = values[np.isfinite(values)]
-    if not len(known):
-        return 0.0, 1.0
-    first, last = np.percentile(known, (low, high))
-    margin = max(0.08 * float(last - first), 1e-9 + 1e-6 * abs(float(last)))
-    return float(first) - margin, float(last) + margin
-
-
 def panels_of(found: Identified, params: Any) -> list[Panel]:
     """Return coast-down, slip against force, radius against speed and dive."""
     windows, theta = found.windows, found.fit.theta
@@ -107,7 +100,7 @@ def panels_of(found: Identified, params: Any) -> list[Panel]:
     law = rolling + np.exp(theta[Place.DRAG]) * v**2
     coast = Panel(
         "resistance [N]: specific force, less the drive's", "speed [m/s]", (0.0, float(v[-1])),
-        _ends(np.concatenate([resistance[free], law])),
+        _ends(resistance[free], law, shown=SHOWN),
         [Line(moving.reference[free], resistance[free], BLUE, marks=True), Line(v, law, PINK)],
     )  # fmt: skip
     used = good & (windows.free | windows.braking)
@@ -119,24 +112,24 @@ def panels_of(found: Identified, params: Any) -> list[Panel]:
     slip = 100.0 * (roll[:, None] * (1.0 + sink) * pair / reference - 1.0)
     force = 1e-3 * moving.force
     stiffness = stiffness_of(theta)
-    ends = _ends(force[:, used].reshape(-1), 0.0, 100.0)
+    ends = _ends(force[:, used].reshape(-1))
     line = np.linspace(*ends, 60)
-    slips = Panel("slip [%] of the axles", "force [kN]", ends, _ends(slip[:, used].reshape(-1), 0.0, 100.0), [
+    slips = Panel("slip [%] of the axles", "force [kN]", ends, _ends(slip[:, used].reshape(-1)), [
         *(Line(force[k, used], slip[k, used], colour, marks=True) for k, colour in enumerate((BLUE, ORANGE))),
         *(Line(line, 1e5 * line / stiffness[k], colour) for k, colour in enumerate((BLUE, ORANGE))),
     ])  # fmt: skip
     radius = 1e3 * moving.reference / pair * (1.0 + moving.slip)
     radii = Panel("rolling radius [mm], slip taken off", "speed [m/s]", (0.0, float(v[-1])),
-                  _ends(radius[:, used].reshape(-1)),
+                  _ends(radius[:, used].reshape(-1), shown=SHOWN),
                   [Line(moving.reference[used], radius[k, used], colour, marks=True)
                    for k, colour in enumerate((BLUE, ORANGE))])  # fmt: skip
     steps = found.steps
     change = steps.change.mean(axis=0)
     short = steps.straight & (steps.seconds <= 1.0)
     dive = steps.felt.mean(axis=0) - change - theta[Place.ZERO]
-    ends = _ends(change[short], 0.0, 100.0)
+    ends = _ends(change[short])
     return [coast, slips, radii, Panel(
-        "accelerometer beyond v' [m/s^2]: dive, slopes", "v' [m/s^2]", ends, _ends(dive[short], 0.0, 100.0),
+        "accelerometer beyond v' [m/s^2]: dive, slopes", "v' [m/s^2]", ends, _ends(dive[short]),
         [Line(change[short], dive[short], BLUE, marks=True),
          Line(np.linspace(*ends, 60), (kappa - 1.0) * np.linspace(*ends, 60), PINK)],
     )]  # fmt: skip

@@ -8,9 +8,9 @@ import numpy as np
 
 from brakelab.arrays import Array
 from brakelab.report.downsample import buckets, extremes, times
+from brakelab.results.outputs import write_text
 from brakelab.simulation.trip.table import KMH, RURAL, URBAN, height_gained
 from ecu.contract.signals import CORNERS
-from ecu.errors import UserError
 
 LEFT, WIDTH, TOP, HEIGHT, GAP = 60.0, 920.0, 24.0, 130.0, 34.0
 POINTS: Final = 1400
@@ -77,7 +77,4 @@ def write_picture(path: Path, t: Array, speed: Array, grade: Array, discs: Array
         + "\n".join(body)
         + "\n</svg>\n"
     )
-    try:
-        path.write_text(text)
-    except OSError as error:
-        raise UserError("--svg", str(path), f"cannot be written ({error.strerror})") from None
+    write_text(path, text, "--svg")

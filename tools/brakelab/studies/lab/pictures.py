@@ -12,7 +12,7 @@ from brakelab.identify.friction.analysis import Components, levels
 from brakelab.identify.friction.cost import Cost
 from brakelab.identify.friction.estimators import NETWORK, OSTERMEYER, SURFACE
 from brakelab.identify.friction.heat_capacity import AT, HeatCapacity
-from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line, Panel, write_chart
+from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line, Panel, ends_of, write_chart
 from brakelab.studies.lab.brakes import Brake
 from brakelab.studies.lab.run import Lab
 from brakelab.studies.lab.searches import Searches
@@ -70,7 +70,7 @@ def correlations(brakes: dict[str, Brake]) -> list[Panel]:
             middles, means = _by_level(values, level), _by_level(brake.mean, level)
             title = f"{name}: mean friction, r = {brake.components.correlation[place]:+.2f}"
             lines = [Line(values, brake.mean, GREY, marks=True), Line(middles, means, ORANGE)]
-            panels.append(Panel(title, label, _ends(values), MU, lines))
+            panels.append(Panel(title, label, ends_of(values), MU, lines))
     return panels
 
 
@@ -194,9 +194,9 @@ def estimators(pads: list[OnTrips]) -> list[Panel]:
         lines += [Line(trace.t, trace.estimates[name], colour) for name, colour in OF_ESTIMATOR.items()]
         spread = np.concatenate([line.y for line in lines])
         title = f"2.8 {kind}: friction, from {3.6 * trace.speed[0]:.0f} to {3.6 * trace.speed[-1]:.0f} km/h"
-        above.append(Panel(title, "t [s]", ends, _ends(spread), lines))
+        above.append(Panel(title, "t [s]", ends, ends_of(spread), lines))
         heats = [Line(trace.t, trace.temperature, "#333"), Line(trace.t, trace.lumped, PINK)]
-        span = _ends(np.concatenate([line.y for line in heats]))
+        span = ends_of(*(line.y for line in heats))
         below.append(Panel(f"2.8 {kind}: disc [°C]", "t [s]", ends, span, heats))
     low = min(float(np.nanmin(each.mu)) for each in found.maps.values())
     high = max(float(np.nanmax(each.mu)) for each in found.maps.values())
@@ -218,11 +218,6 @@ def estimators(pads: list[OnTrips]) -> list[Panel]:
 def _by_level(values: Vector, level: NDArray[np.int64]) -> Vector:
     """Return the mean of `values` at each level."""
     return np.asarray(np.bincount(level, values) / np.bincount(level))
-
-
-def _ends(values: Vector) -> tuple[float, float]:
-    edge = 0.04 * float(np.ptp(values)) + 1e-9
-    return float(values.min()) - edge, float(values.max()) + edge
 
 
 def _edges(middles: Vector) -> Vector:
