@@ -215,7 +215,7 @@ TEXT: Final = (
 
 
 def _run(asked: Asked) -> Measured:
-    """Some 40 s for five cars."""
+    """Some 15 s for five cars."""
     cars = min(asked.seeds, CARS)
     corner = corner_of(drawn_car(SEED), 0)
     stops = {f"{road}-{driver}": road_stops(road, driver, SEED) for road in ROADS for driver in DRIVERS}

@@ -20,6 +20,7 @@ from brakelab.identify.wear.programme import CHECK_OFF
 from brakelab.plant.disc import cooling_rate, disc_step
 from brakelab.plant.friction.law import START
 from brakelab.plant.friction.laws import friction
+from brakelab.plant.jit import Record, kernel
 from brakelab.plant.records import RecordArray
 from brakelab.plant.wear import running_in, wear_rate
 from brakelab.plant.wear_rig import AIR, FAN, LOWEST_SPEED, RAMP
@@ -102,13 +103,15 @@ def run_stops(corner: Corner, stops: Array, worn: float, references: Array | Non
     return Done(*done.T)
 
 
-def _cool(corner: Corner, heat: float, seconds: float, speed: float) -> float:
+@kernel
+def _cool(corner: Record, heat: float, seconds: float, speed: float) -> float:
     row = corner.car[0]
-    rate = cooling_rate(row["cooling"][corner.wheel], row["cooling_by_speed"][corner.wheel], speed, 0.0)
+    rate = cooling_rate(row.cooling[corner.wheel], row.cooling_by_speed[corner.wheel], speed, 0.0)
     return AIR + (heat - AIR) * math.exp(-rate * seconds)
 
 
-def _wait(corner: Corner, heat: float, reference: float, speed: float) -> tuple[float, float]:
+@kernel
+def _wait(corner: Record, heat: float, reference: float, speed: float) -> tuple[float, float]:
     """Return the disc's temperature and the time when the flywheel has run up, by Figure 7.5."""
     waited = 0.0
     while heat > reference and waited < LONGEST_WAIT:
@@ -118,19 +121,17 @@ def _wait(corner: Corner, heat: float, reference: float, speed: float) -> tuple[
     return _cool(corner, heat, run_up, FAN * 0.5 * speed), waited + run_up
 
 
+@kernel
 def _stop(
-    corner: Corner, profile: tuple[float, float, float], air: float, resists: bool, worn: float, heat: float
+    corner: Record, profile: tuple[float, float, float], air: float, resists: bool, worn: float, heat: float
 ) -> tuple[float, float, float, float, float]:
     """Return energy [J], seconds, mean temperature, wear [g] and the temperature after one application."""
-    row, i = corner.car[0], corner.wheel
-    law, numbers, wear_row = int(row["friction_law"][i]), row["friction_row"][i], row["wear_row"][i]
-    area, reach = float(row["piston_area"][i]), float(row["effective_radius"][i])
-    scale, heating = float(row["friction_scale"][i]), float(row["heating"][i])
-    wear_scale, radius = float(row["wear_scale"][i]), corner.radius
+    row, i, radius = corner.car[0], corner.wheel, corner.radius
+    law, numbers, wear_row = row.friction_law[i], row.friction_row[i], row.wear_row[i]
+    area, reach = row.piston_area[i], row.effective_radius[i]
     speed, last, decel = profile
-    still, by_speed = float(row["cooling"][i]), float(row["cooling_by_speed"][i])
-    cooling = cooling_rate(still, by_speed, air * speed, 0.0)
-    memory, mu, t = float(numbers[START]), 0.3, 0.0
+    cooling = cooling_rate(row.cooling[i], row.cooling_by_speed[i], air * speed, 0.0)
+    memory, mu, t = numbers[START], 0.3, 0.0
     energy = warm = lost = 0.0
     while speed > last:
         share = min(t / RAMP, 1.0)
@@ -140,13 +141,13 @@ def _stop(
         torque, omega = force * radius, speed / radius
         pressure = torque / (2.0 * area * reach * max(mu, 0.05))
         memory, now = friction(law, numbers, memory, pressure, reach * omega, slowing / radius, heat, STEP)
-        mu = scale * now
+        mu = row.friction_scale[i] * now
         normal = 2.0 * pressure * area
         rate = wear_rate(wear_row, normal, reach * omega, pressure, heat)
-        lost += STEP * wear_scale * running_in(wear_row, worn + lost) * rate
+        lost += STEP * row.wear_scale[i] * running_in(wear_row, worn + lost) * rate
         work = STEP * torque * omega
         energy, warm = energy + work, warm + work * heat
-        heat = disc_step(heat, heating, cooling, torque * omega, AIR, STEP)
+        heat = disc_step(heat, row.heating[i], cooling, torque * omega, AIR, STEP)
         speed -= STEP * max(slowing, 1e-3)
         t += STEP
     return energy, t, warm / energy if energy else heat, lost, heat
