@@ -6,6 +6,7 @@ section 7.4, each with at least 250 applications. After each the pads are weighe
 
 import csv
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -45,23 +46,24 @@ class WornBlock(NamedTuple):
     """g, true."""
 
 
+@cache
+def _trip_stops(seed: int) -> Array:
+    """Return speeds before and after, deceleration and seconds before of all applications of a trip."""
+    trip = real_driving(seed)
+    found = brakings(trip.t, trip.speed, -np.gradient(trip.speed, trip.t))
+    before = np.diff(found.start, prepend=0.0) - np.concatenate([[0.0], found.duration[:-1]])
+    return np.column_stack((found.speed_in, found.speed_out, found.mean_decel, np.minimum(before, 120.0)))
+
+
 def road_stops(road: str, driver: str, seed: int) -> Array:
     """Return speeds before and after [m/s], deceleration [m/s^2], seconds before; shape (APPLICATIONS, 4)."""
     low, high = (KMH * value for value in ROADS[road])
     harder, faster = DRIVERS[driver]
     rows: list[Array] = []
     while sum(map(len, rows)) < APPLICATIONS:
-        trip = real_driving(seed + 100 * len(rows))
-        found = brakings(trip.t, trip.speed, -np.gradient(trip.speed, trip.t))
-        before = np.diff(found.start, prepend=0.0) - np.concatenate([[0.0], found.duration[:-1]])
-        part = (found.speed_in >= low) & (found.speed_in < high)
-        table = (
-            faster * found.speed_in,
-            faster * found.speed_out,
-            harder * found.mean_decel,
-            np.minimum(before, 120.0),
-        )
-        rows.append(np.column_stack(table)[part])
+        stops = _trip_stops(seed + 100 * len(rows))
+        part = (stops[:, 0] >= low) & (stops[:, 0] < high)
+        rows.append(stops[part] * [faster, faster, harder, 1.0])
     return np.concatenate(rows)[:APPLICATIONS]
 
 
