@@ -9,6 +9,7 @@ from brakelab.identify.vehicle.model import (
     motion,
     prior_of,
     residuals_of,
+    seen,
     signals_of,
     stiffness_of,
 )
@@ -46,7 +47,7 @@ def theta_of(windows):
 def test_rolling_free_the_balance_is_drag_and_rolling_resistance():
     windows = steady(np.array([-0.3, -0.3]), np.array([10.0, 30.0]))
     theta, params = theta_of(windows)
-    found = motion(theta, windows, 0, params)
+    found = motion(theta, seen(windows, 0), params)
     mass, kappa = params["mass"], 1.0 + GRAVITY * params["pitch_gradient"]
     drag = params["drag_area"] * np.array([10.0, 30.0]) ** 2
     load = 1.0 + 0.3 / kappa * np.exp(theta[Place.LOAD_F]), 1.0 - 0.3 / kappa * np.exp(theta[Place.LOAD_R])
@@ -60,7 +61,7 @@ def test_brakes_and_motors_balance_the_deceleration():
     windows = steady(np.array([-3.0]), np.array([20.0]), (30.0, 20.0), 100.0)
     theta, params = theta_of(windows)
     theta[Place.ROLLING] = 0.0
-    found = motion(theta, windows, 1, params)
+    found = motion(theta, seen(windows, 1), params)
     per_bar = 4e5 * params["piston_area"] * params["effective_radius"] * params["mu_nominal"]
     accel = -3.0 / (1.0 + GRAVITY * params["pitch_gradient"])
     sink = np.exp(theta[Place.DEFLECTION]) * accel
@@ -75,7 +76,7 @@ def test_slip_is_force_over_stiffness_and_the_speed_follows():
     theta, params = theta_of(windows)
     theta[[Place.CURVE, Place.ROLLING]] = 0.0
     theta[[Place.LOAD_F, Place.LOAD_R, Place.DEFLECTION]] = -20.0  # no load transfer
-    found = motion(theta, windows, 0, params)
+    found = motion(theta, seen(windows, 0), params)
     stiffness = (params["slip_stiffness"] * params["static_load"]).reshape(2, 2).sum(axis=1)
     assert stiffness_of(theta) == pytest.approx(stiffness)
     slip = -600.0 / params["wheel_radius"][::2] / stiffness

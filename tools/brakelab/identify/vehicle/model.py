@@ -16,6 +16,7 @@ from enum import IntEnum, auto
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
 from brakelab.identify.vehicle.fit import Places, Prior, Residuals
@@ -143,6 +144,34 @@ def brakes_of(theta: Vector) -> Vector:
     return np.asarray(np.exp(theta[Place.BRAKES]) * np.array([1.0, ratio]) / (1.0 + ratio))
 
 
+class Seen(NamedTuple):
+    """Windows by axle for one half of the samples, shape (n,) or (2, n); 0: not sent."""
+
+    accel: Vector
+    omega: Vector
+    spin_up: Vector
+    motor: Vector
+    pressure: Vector
+    speed: Vector
+    speed_rate: Vector
+    braking: NDArray[np.bool_]
+
+
+def seen(windows: Windows, half: int) -> Seen:
+    """Return what `motion` takes of the windows, which is the same for all parameters."""
+    pairs = [np.nan_to_num(values[:, half]).reshape(2, 2, -1) for values in (windows.motor, windows.pressure)]
+    return Seen(
+        windows.accel[half],
+        windows.omega[:, half].reshape(2, 2, -1).mean(axis=1),
+        windows.spin_up[:, half],
+        pairs[0].sum(1),
+        pairs[1].mean(axis=1),
+        windows.speed[half],
+        windows.speed_rate[half],
+        windows.braking,
+    )
+
+
 class Motion(NamedTuple):
     """What the model says of windows for one half of the samples."""
 
@@ -157,13 +186,12 @@ class Motion(NamedTuple):
     slip: Vector
 
 
-def motion(theta: Vector, windows: Windows, half: int, params: Any) -> Motion:
+def motion(theta: Vector, windows: Seen, params: Any) -> Motion:
     """Return the model's account of windows; `params` is one `PARAMS`: wheel inertia, axle loads."""
     x = dict(zip(Place, theta, strict=True))
     mass = np.exp(x[Place.MASS])
     kappa = 1.0 + GRAVITY * x[Place.PITCH]
-    accel = (windows.accel[half] - x[Place.ZERO]) / kappa
-    pair = windows.omega[:, half].reshape(2, 2, -1).mean(axis=1)
+    accel = (windows.accel - x[Place.ZERO]) / kappa
     load = np.stack([1.0 - np.exp(x[Place.LOAD_F]) * accel, 1.0 + np.exp(x[Place.LOAD_R]) * accel])
     load = np.maximum(load, 0.2)
     share = np.array([params["rear_axle"], params["front_axle"]]) / params["wheelbase"]
@@ -171,23 +199,21 @@ def motion(theta: Vector, windows: Windows, half: int, params: Any) -> Motion:
     sink = np.exp(x[Place.DEFLECTION]) * accel * np.array([[1.0], [-1.0]])
     radius = np.exp([[x[Place.RADIUS_F]], [x[Place.RADIUS_R]]]) * (1.0 + sink)
     inertia = np.exp(x[Place.INERTIA]) * np.asarray(params["wheel_inertia"]).reshape(2, 2).sum(axis=1)
-    torque = inertia[:, None] * windows.spin_up[:, half]
-    torque = torque + np.exp(x[Place.MOTOR]) * np.nan_to_num(windows.motor[:, half]).reshape(2, 2, -1).sum(1)
-    pressure = np.nan_to_num(windows.pressure[:, half]).reshape(2, 2, -1).mean(axis=1)
-    over = np.maximum(pressure - np.array([[x[Place.PUSH_OUT_F]], [x[Place.PUSH_OUT_R]]]), 0.0)
+    torque = inertia[:, None] * windows.spin_up + np.exp(x[Place.MOTOR]) * windows.motor
+    over = np.maximum(windows.pressure - np.array([[x[Place.PUSH_OUT_F]], [x[Place.PUSH_OUT_R]]]), 0.0)
     brakes = brakes_of(theta)[:, None] * over
     torque = torque + np.where(windows.braking, brakes, 0.0)
     force = -torque / radius - x[Place.ROLLING] * weight
     stiffness = stiffness_of(theta)[:, None] * load ** (1.0 - x[Place.DEGRESSION])
     used = np.clip(force / weight, -1.0, 1.0)
     slip = force / stiffness * (1.0 + x[Place.CURVE] * used**2)
-    axle = radius * pair / (1.0 + slip)
-    referenced = np.isfinite(windows.speed[half])
-    later = windows.speed[half] + x[Place.DELAY] * windows.speed_rate[half]
+    axle = radius * windows.omega / (1.0 + slip)
+    referenced = np.isfinite(windows.speed)
+    later = windows.speed + x[Place.DELAY] * windows.speed_rate
     reference = np.where(referenced, later, axle[0])
     drag = np.exp(x[Place.DRAG]) * reference * np.abs(reference)
     overrun = np.where(windows.braking, x[Place.OVERRUN], 0.0)
-    balance = windows.accel[half] - x[Place.ZERO] - kappa * ((force.sum(axis=0) - drag) / mass - overrun)
+    balance = windows.accel - x[Place.ZERO] - kappa * ((force.sum(axis=0) - drag) / mass - overrun)
     return Motion(balance, axle, reference, force, slip)
 
 
@@ -212,10 +238,11 @@ def residuals_of(windows: Windows, params: Any, signals: Signals, least: tuple[f
     ]
     used = np.unique(np.concatenate([rows for rows, _, _ in parts]))
     own = select(windows, used)
+    halves = [seen(own, half) for half in range(2)]
     places = [np.searchsorted(used, rows) for rows, _, _ in parts]
 
     def of(theta: Vector, half: int) -> Vector:
-        found = motion(theta, own, half, params)
+        found = motion(theta, halves[half], params)
         speeds = found.axle - found.reference
         values = (found.balance, speeds[0], speeds[1])
         return np.concatenate([values[what][at] for (_, what, _), at in zip(parts, places, strict=True)])

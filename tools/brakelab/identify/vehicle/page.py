@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from brakelab.identify.vehicle.model import Place, motion, stiffness_of
+from brakelab.identify.vehicle.model import Place, motion, seen, stiffness_of
 from brakelab.identify.vehicle.parameters import Parameter
 from brakelab.identify.vehicle.solve import Identified
 from brakelab.results.chart import BLUE, ORANGE, PINK, Line, Panel, ends_of, write_chart
@@ -61,7 +61,7 @@ def zeros_table(found: Identified) -> Table:
 def overrun_table(found: Identified, params: Any) -> Table:
     """Return the force of the drive by speed, accelerator released, beyond drag and rolling resistance."""
     windows, theta = found.windows, found.fit.theta
-    moving = motion(theta, windows, 0, params)
+    moving = motion(theta, seen(windows, 0), params)
     accel = (windows.accel.mean(axis=0) - theta[Place.ZERO]) / (1.0 + GRAVITY * theta[Place.PITCH])
     rest = np.exp(theta[Place.DRAG] - theta[Place.MASS]) * moving.reference**2
     drive = -accel - rest - GRAVITY * theta[Place.ROLLING]
@@ -87,7 +87,7 @@ def overrun_table(found: Identified, params: Any) -> Table:
 def panels_of(found: Identified, params: Any) -> list[Panel]:
     """Return coast-down, slip against force, radius against speed and dive."""
     windows, theta = found.windows, found.fit.theta
-    moving = motion(theta, windows, 0, params)
+    moving = motion(theta, seen(windows, 0), params)
     kappa = 1.0 + GRAVITY * theta[Place.PITCH]
     mass = float(np.exp(theta[Place.MASS]))
     accel = (windows.accel.mean(axis=0) - theta[Place.ZERO]) / kappa

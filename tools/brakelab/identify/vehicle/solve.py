@@ -17,6 +17,7 @@ from brakelab.identify.vehicle.model import (
     motion,
     prior_of,
     residuals_of,
+    seen,
     signals_of,
 )
 from brakelab.identify.vehicle.reader import DriveSamples
@@ -91,7 +92,7 @@ def identify(drives: Sequence[DriveSamples], start: RecordArray, closed: bool) -
     found, known = fit(residuals, prior), prior
     still = yaw_zero(windows)
     for _ in range(ROUNDS):
-        moving = motion(found.theta, windows, 0, params)
+        moving = motion(found.theta, seen(windows, 0), params)
         radius = np.exp(found.theta[[Place.RADIUS_F, Place.RADIUS_R]])
         pairs = pairs_of(windows, radius, moving.slip, still, params)
         steps = steps_of(windows, _speed(found.theta, windows, params))
@@ -120,7 +121,7 @@ def _noise(drives: Sequence[DriveSamples], params: Any) -> tuple[float, float]:
 def _speed(theta: Vector, windows: Windows, params: Any) -> Vector:
     """Return the speed by all wheels [m/s] by halves, shape (2, n), NaN: not known."""
     known = windows.free | windows.braking
-    by_half = [motion(theta, windows, half, params).axle.mean(axis=0) for half in range(2)]
+    by_half = [motion(theta, seen(windows, half), params).axle.mean(axis=0) for half in range(2)]
     return np.where(known, np.stack(by_half), np.where(windows.standing, 0.0, np.nan))
 
 
