@@ -6,9 +6,10 @@ for the end of the leg (a light, a junction, a bend, a queue). Accelerations are
 Every trip meets Table 1.1: as on the road, one that violates a row is discarded and repeated.
 
 ```
-python -m brakelab.simulation.trip.generate [--seed N] [--svg PICTURE.svg] [DRIVE.truth.parquet]
+python -m brakelab.simulation.trip.generate [--seed N] [--svg PICTURE.svg] [DRIVE.truth.parquet…]
 ```
-prints the trip of a seed, or a drive of the simulated car that followed it, beside Tables 1.1 and 1.2.
+prints the trip of a seed, or a drive of the simulated car that followed it, beside Tables 1.1 and 1.2; of
+several drives applications and wear by road, with 2σ of the drivers (Figure 7.4).
 """
 
 import argparse
@@ -24,10 +25,10 @@ import numpy as np
 from numpy.random import Generator
 
 from brakelab.arrays import Array
-from brakelab.report.drive import read_drive
+from brakelab.report.drive import DriveResult, read_drive
 from brakelab.simulation.trip import report as trip_report
 from brakelab.simulation.trip.picture import write_picture
-from brakelab.simulation.trip.table import KMH, brakings, distance_driven, trip_rows
+from brakelab.simulation.trip.table import KMH, Brakings, brakings, distance_driven, trip_rows
 from ecu.errors import UserError
 
 DT: Final = 0.1  # s, of the samples
@@ -257,38 +258,54 @@ def real_driving(seed: int) -> Cycle:
     )
 
 
+def _read(path: Path) -> DriveResult:
+    drive = read_drive(path, trip_report.DRIVE_COLUMNS, "give the truth of a simulated drive")
+    if not drive.columns["vehicle_speed"].max() > 0.0:
+        raise UserError(str(path), "vehicle_speed", "never above 0; give a car that moves")
+    return drive
+
+
+def _brakings(drive: DriveResult) -> Brakings:
+    speed = drive.columns["vehicle_speed"]
+    return brakings(drive.t, speed, -np.gradient(speed, drive.t))
+
+
 def main(argv: list[str] | None = None) -> int:
     """Print, and draw, a trip or a drive; returns the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m brakelab.simulation.trip.generate",
         description="A trip beside the thesis' Tables 1.1 and 1.2.",
     )
-    parser.add_argument("drive", nargs="?", type=Path, help="NAME.truth.parquet of a car that followed it")
+    parser.add_argument(
+        "drive",
+        nargs="*",
+        type=Path,
+        help="NAME.truth.parquet of a car that followed it; several: by road, ± 2σ",
+    )
     parser.add_argument("--seed", type=int, default=1, help="of the trip, from 0 on")
     parser.add_argument("--svg", type=Path, metavar="FILE", help="where to draw it")
     arguments = parser.parse_args(argv)
     try:
         if arguments.seed < 0:
             raise UserError("--seed", str(arguments.seed), "give a whole number from 0 on")
+        drives = [_read(path) for path in arguments.drive]
+        if len(drives) > 1:
+            print("\n".join(trip_report.spread_lines([(drive, _brakings(drive)) for drive in drives])))
+            return 0
         trip = real_driving(arguments.seed)
         t, speed, grade = trip.t, trip.speed, trip.grade_by_time()
         lines = [f"Trip of seed {arguments.seed}", ""]
         discs = np.empty((len(t), 0))  # none are known
-        if arguments.drive is not None:
-            drive = read_drive(
-                arguments.drive, trip_report.DRIVE_COLUMNS, "give the truth of a simulated drive"
-            )
+        for drive in drives:
             t, speed, grade = drive.t, drive.columns["vehicle_speed"], drive.columns["grade"]
-            if not speed.max() > 0.0:
-                raise UserError(str(arguments.drive), "vehicle_speed", "never above 0; give a car that moves")
             discs = drive.corners("disc_temperature")
-            lines = [f"{arguments.drive.name} beside the trip of seed {arguments.seed}"]
+            lines = [f"{arguments.drive[0].name} beside the trip of seed {arguments.seed}"]
             lines += [trip_report.follow_line(t, speed, trip.t, trip.speed), ""]
             lines += [*trip_report.brake_lines(drive), ""]
         found = brakings(t, speed, -np.gradient(speed, t))
         lines += [*trip_report.trip_lines(t, speed, grade, found), ""]
         lines += [*trip_report.part_lines(t, speed, discs, found), ""]
-        if arguments.drive is not None:
+        for drive in drives:
             lines += [*trip_report.friction_lines(drive, found), ""]
         print("\n".join([*lines, *trip_report.braking_lines(found)]))
         if arguments.svg is not None:

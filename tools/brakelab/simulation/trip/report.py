@@ -1,5 +1,6 @@
 """Trip report as plain text: Tables 1.1 and 1.2 beside the trip, its brakings and use of its brakes."""
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -16,8 +17,10 @@ DRIVE_COLUMNS: Final = (
     *(f"{stem}_{c}" for stem in ("mu_b", "pad_wear_mass") for c in CORNERS),
 )
 """Columns of the truth that `brake_lines` and the tables need."""
+FRICTION_BIN: Final = 0.02
 ROADS: Final = (("Urban", -np.inf, URBAN), ("Rural", URBAN, RURAL), ("Motorway", RURAL, np.inf))
 """m/s, of the speed before an application."""
+AXLES: Final = {"front": slice(0, 2), "rear": slice(2, 4)}
 BIN: Final = 0.5  # m/s^2, of the histogram
 
 
@@ -58,10 +61,14 @@ def trip_lines(t: Array, speed: Array, grade: Array, found: Brakings) -> list[st
     ):
         lines.append(f"{name:36}{unit:>7}{printed:>20}{value:9.2f}")
     lines += ["", "Mean deceleration [m/s^2], a # for each braking"]
-    edges = np.arange(0.0, max(float(decel.max()), 3.0) + BIN, BIN)
-    for low, number in zip(edges, np.histogram(decel, edges)[0], strict=False):
-        lines.append(f"{low:4.1f} to {low + BIN:3.1f}{number:5d}  {'#' * number}".rstrip())
-    return lines
+    return lines + _histogram(decel, np.arange(0.0, max(float(decel.max()), 3.0) + BIN, BIN), 1)
+
+
+def _histogram(values: Array, edges: Array, places: int) -> list[str]:
+    return [
+        f"{low:4.{places}f} to {high:3.{places}f}{number:5d}  {'#' * number}".rstrip()
+        for low, high, number in zip(edges, edges[1:], np.histogram(values, edges)[0], strict=False)
+    ]
 
 
 def part_lines(t: Array, speed: Array, discs: Array, found: Brakings) -> list[str]:
@@ -73,10 +80,9 @@ def part_lines(t: Array, speed: Array, discs: Array, found: Brakings) -> list[st
     lines = [f"{'Brakings, means':16}{'number':>8}{'per 100 km':>12}{'from [km/h]':>13}{'by [m/s^2]':>12}"]
     if discs.size:
         lines[0] += "  discs before, front and rear [degC]"
-    metres = np.diff(distance_driven(t, speed))
     for name, low, high in ROADS:
         here = (found.speed_in > low) & (found.speed_in <= high)
-        kilometres = metres[(speed[1:] > low) & (speed[1:] <= high)].sum() / 1e3
+        kilometres = _kilometres(t, speed, low, high)
         if kilometres == 0.0:
             continue
         number = int(here.sum())
@@ -88,6 +94,11 @@ def part_lines(t: Array, speed: Array, discs: Array, found: Brakings) -> list[st
                 line += f"{before[:2].mean():10.0f}{before[2:].mean():8.0f}"
         lines.append(line)
     return lines
+
+
+def _kilometres(t: Array, speed: Array, low: float, high: float) -> float:
+    metres = np.diff(distance_driven(t, speed))
+    return float(metres[(speed[1:] > low) & (speed[1:] <= high)].sum() / 1e3)
 
 
 def braking_lines(found: Brakings) -> list[str]:
@@ -109,10 +120,33 @@ def follow_line(t: Array, speed: Array, trip_t: Array, trip_speed: Array) -> str
 
 
 def friction_lines(drive: DriveResult, found: Brakings) -> list[str]:
-    """Return friction of the applications of each axle, and wear over work, by road.
+    """Return friction of the applications of each axle, and wear over work, by road; then its histogram.
 
     After Table 1.2, Figures 1.3c and 7.4b. An application's friction is its mean over time, of both wheels.
     """
+    mean, worn, done = _of_applications(drive, found)
+    lines = [f"{'Brakings':16}{'axle':>6}{'friction':>10}{'deviation':>11}{'wear [g/MJ]':>13}"]
+    for name, low, high in (("All", -np.inf, np.inf), *ROADS):
+        here = (found.speed_in > low) & (found.speed_in <= high)
+        if not here.any():
+            continue
+        for axle, of in AXLES.items():
+            level, rate = mean[here, of], worn[here, of].sum() / max(done[here, of].sum(), 1e-9)
+            lines.append(
+                f"{name:16}{axle:>6}{level.mean():10.3f}{level.mean(axis=1).std():11.3f}{rate:13.3f}"
+            )
+    for axle, of in AXLES.items():
+        level = mean[:, of].mean(axis=1)
+        if len(level):
+            lines += ["", f"Mean friction, {axle}, a # for each braking"]
+            first, last = (int(np.floor(value / FRICTION_BIN + 1e-9)) for value in (level.min(), level.max()))
+            edges = np.arange(first, last + 2, dtype=np.float64) * FRICTION_BIN - 1e-9
+            lines += _histogram(level, edges, 2)
+    return lines
+
+
+def _of_applications(drive: DriveResult, found: Brakings) -> tuple[Array, Array, Array]:
+    """Return mean friction, wear [g] and work [MJ] of every application, shapes (applications, 4)."""
     power = drive.corners("brake_torque") * np.abs(drive.corners("wheel_speed"))
     work = np.vstack([np.zeros(4), np.cumsum(np.diff(drive.t)[:, None] * power[1:], axis=0)])
     begins, ends = (np.searchsorted(drive.t, when) for when in (found.start, found.start + found.duration))
@@ -124,16 +158,28 @@ def friction_lines(drive: DriveResult, found: Brakings) -> list[str]:
         np.array([values[end] - values[begin] for begin, end in pairs]).reshape(-1, 4)
         for values in (drive.corners("pad_wear_mass"), 1e-6 * work)
     )
-    lines = [f"{'Brakings':16}{'axle':>6}{'friction':>10}{'deviation':>11}{'wear [g/MJ]':>13}"]
-    for name, low, high in (("All", -np.inf, np.inf), *ROADS):
-        here = (found.speed_in > low) & (found.speed_in <= high)
-        if not here.any():
-            continue
-        for axle, of in (("front", slice(0, 2)), ("rear", slice(2, 4))):
-            level, rate = mean[here, of], worn[here, of].sum() / max(done[here, of].sum(), 1e-9)
-            lines.append(
-                f"{name:16}{axle:>6}{level.mean():10.3f}{level.mean(axis=1).std():11.3f}{rate:13.3f}"
-            )
+    return mean, worn, done
+
+
+def spread_lines(drives: Sequence[tuple[DriveResult, Brakings]]) -> list[str]:
+    """Return applications per distance and wear over work by road, mean of the drives ± 2 σ (Figure 7.4)."""
+    lines = [
+        f"{f'Of {len(drives)} drives':16}{'brakings per 100 km':>21}{'front [g/MJ]':>18}{'rear [g/MJ]':>18}"
+    ]
+    for name, low, high in ROADS:
+        rows = []
+        for drive, found in drives:
+            here = (found.speed_in > low) & (found.speed_in <= high)
+            _, worn, done = _of_applications(drive, found)
+            rates = [worn[here, of].sum() / max(done[here, of].sum(), 1e-9) for of in AXLES.values()]
+            kilometres = _kilometres(drive.t, drive.column("vehicle_speed"), low, high)
+            rows.append((100.0 * here.sum() / kilometres if kilometres else np.nan, *rates))
+        mean, two_sigma = np.mean(rows, axis=0), 2.0 * np.std(rows, axis=0, ddof=1)
+        cells = [
+            f"{value:{places}} ± {wide:{places}}"
+            for value, wide, places in zip(mean, two_sigma, (".0f", ".3f", ".3f"), strict=True)
+        ]
+        lines.append(f"{name:16}{cells[0]:>21}{cells[1]:>18}{cells[2]:>18}")
     return lines
 
 
