@@ -44,3 +44,7 @@ def test_the_page_of_a_constant(tmp_path: Path, columns: Columns, stops: Stops) 
     level = float(re.search(r"κ of \(3\.12\): (0\.\d+) ± 0\.\d+ at 100 °C", page).group(1))
     assert level == pytest.approx(stops.mu[np.unique(stops.block_stop, return_index=True)[1]].mean(), rel=0.1)
     assert charts[0].count("h0") == 3 * len(stops)
+    write_report(path, columns, stops, identified, [], stops)
+    charts = re.findall(r"<svg.*?</svg>", path.read_text("utf-8"), re.DOTALL)
+    assert [chart.count("<rect x=") for chart in charts] == [2, 4, 4, 1, 3]
+    assert re.findall(r"stop (\d+): ", charts[2]) == [str(number) for number in titles]

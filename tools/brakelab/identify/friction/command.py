@@ -164,7 +164,7 @@ def friction(
     for table in tables:
         show(Console(), table)
     write_lining(out, measured.columns, measured.heating, identified)
-    write_report(page, measured.columns, measured.stops, identified, tables)
+    write_report(page, measured.columns, measured.stops, identified, tables, unseen)
     give(chosen=identified.chosen.name, stops=identified.stops)
     wrote(out, page)
     say(f"{out}: the law chosen under the name SIM; {page}: how well and how far it holds")

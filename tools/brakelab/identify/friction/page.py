@@ -23,9 +23,17 @@ WARM: Final = 100.0  # °C
 
 
 def write_report(
-    path: Path, columns: Columns, stops: Stops, identified: Identified, tables: Sequence[Table]
+    path: Path,
+    columns: Columns,
+    stops: Stops,
+    identified: Identified,
+    tables: Sequence[Table],
+    unseen: Stops | None = None,
 ) -> None:
-    """Write the page: the chosen law, its fit, its residuals, where it ends, and `tables`."""
+    """Write the page: the chosen law, its fit, its residuals, where it ends, and `tables`.
+
+    `unseen`: stops of another programme, on which the law is drawn as it is used (Figure 3.13).
+    """
     chosen = identified.chosen
     law = replayed(chosen.law, columns.brake, stops, chosen.starts_at_measured)
     off = 100.0 * (law - stops.mu) / stops.mu.mean()
@@ -72,6 +80,13 @@ def write_report(
     )
     unsure = ", ".join(chosen.unidentified)
     within = _over_time(stops, law)
+    beyond: list[str] = []
+    if unseen is not None:
+        used = replayed(chosen.law, columns.brake, unseen, False, closed=True)
+        beyond = [
+            "<h2>Friction over time, held out</h2><p>Stops that the law has not seen, in closed loop.</p>",
+            scrolling(chart_svg(_over_time(unseen, used), [("measured", GREY), ("law", BLUE)])),
+        ]
     body = [
         f"<h1>Friction law of {escape(columns.name)}: {escape(chosen.name)}</h1>",
         f"<p>{identified.stops} stops; nRMSE {chosen.error:.2f} % on them, {chosen.held_out:.2f} % unseen. "
@@ -83,6 +98,7 @@ def write_report(
         "<h2>Friction over time</h2><p>From the stop that the law explains best to that which it explains "
         "worst.</p>",
         scrolling(chart_svg(within, [("measured", GREY), ("law", BLUE)])),
+        *beyond,
         "<h2>First contact</h2><p>Friction of the first blocks of every stop over the disc's temperature, "
         f"κ of (3.12): {kappa}.</p>",
         scrolling(chart_svg([adhesion], [("stops", GREY), ("κ", BLUE)])),
