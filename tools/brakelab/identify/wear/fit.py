@@ -3,8 +3,10 @@
 Every column is scaled to 1, every block weighted by its standard deviation: that of the measurement and a
 share of its mass, the scatter unexplained by any law, estimated with it. All sets of terms admitted by the
 rank of the scaled regressors are tried, and each is judged by the blocks that it did not see. The law is the
-mean of all sets, each by its likelihood of the blocks left out, (error)^-n: few blocks do not select one set,
-and a law chosen as if they did is wrong by what was left out of it. Confidence: parametric bootstrap, the set
+mean of all sets, each by the root of its likelihood of the blocks left out, (error)^(-n/2), as the laws that
+left them out share all the others: few blocks do not select one set, and a law chosen as if they did is wrong
+by what was left out of it. Of sets that predict alike those count more that have work and its heat alone: on
+blocks of other laws than these the rest is chance (`RARE`). Confidence: parametric bootstrap, the set
 drawn anew every time.
 """
 
@@ -27,6 +29,9 @@ ROUNDS: Final = 400
 CONFIDENCE: Final = (2.5, 97.5)  # %
 ELSEWHERE: Final = 50.0  # K by which roads differ from a programme
 LEAST_ERROR: Final = 0.02  # of blocks left out: weighings are no better
+WORK: Final = (0, 2)  # terms of work and of its heat, which most linings show
+RARE: Final = 0.3
+"""Prior odds of a set for each of its other terms."""
 LEAST_WEIGHT: Final = 0.02  # of the best set's, below which a set is left out
 STRANGE: Final = 0.25
 """Logarithm of a block's mass over its law's; pressure and running-in, in no law, can make as much."""
@@ -106,11 +111,16 @@ def _fit_terms(
 
 
 def fit_law(
-    regressors: Array, mass: Array, variance: Array, allowed: tuple[int, ...] = tuple(range(7)), seed: int = 0
+    regressors: Array,
+    mass: Array,
+    variance: Array,
+    allowed: tuple[int, ...] = tuple(range(7)),
+    seed: int = 0,
+    rare: float = RARE,
 ) -> Fit:
     """Return the law of the blocks: `regressors` (n, 7), `mass` [g] and its `variance` [g^2] (n,).
 
-    `allowed`: indices of admissible terms.
+    `allowed`: indices of admissible terms; `rare`: see `RARE`.
 
     Raises:
         UserError: there are too few blocks, or all are similar.
@@ -130,7 +140,9 @@ def fit_law(
     sigmas = [_sigma(mass, variance, scatter) for _, scatter, _ in tried]
     unseen = np.array([_left_out(regressors, mass, *one) for one in zip(sigmas, sets, strict=True)])
     error = np.maximum(np.sqrt(np.mean((unseen / mass - 1.0) ** 2, axis=1)), LEAST_ERROR)
-    weight = (error / error.min()) ** -len(mass)
+    prior = np.array([rare ** len(set(terms) - set(WORK)) for terms in sets])
+    weight = prior * (error / error.min()) ** (-0.5 * len(mass))
+    weight /= weight.max()
     weight = np.where(weight < LEAST_WEIGHT, 0.0, weight) / np.sum(weight[weight >= LEAST_WEIGHT])
     coefficients = weight @ np.array([found for found, _, _ in tried])
     scatter = float(weight @ np.array([one for _, one, _ in tried]))
@@ -169,16 +181,16 @@ def strangers(regressors: Array, mass: Array, variance: Array) -> list[int]:
     """Return the blocks whose mass the law of the others does not come near, worst first.
 
     A wrong block spoils the law of all, so that everybody seems off; without it the others agree. So a block
-    is held against how well the others predict each other once it is gone. Arguments as of `fit_law`. At most
-    one block of four is left out, and four must agree.
+    is held against how well the others predict each other once it is gone, by laws of whatever terms.
+    Arguments as of `fit_law`. At most one block of four is left out, and four must agree.
     """
     kept = np.arange(len(mass))
     found: list[int] = []
     while len(kept) > FEWEST_BLOCKS and len(found) < len(mass) // FEWEST_BLOCKS:
-        law = fit_law(regressors[kept], mass[kept], variance[kept])
+        law = fit_law(regressors[kept], mass[kept], variance[kept], rare=1.0)
         worst = int(np.argmax(_off(mass[kept], law.left_out)))
         one, others = kept[worst], np.delete(kept, worst)
-        rest = fit_law(regressors[others], mass[others], variance[others])
+        rest = fit_law(regressors[others], mass[others], variance[others], rare=1.0)
         usual = float(np.sqrt(np.mean(_off(mass[others], rest.left_out) ** 2)))
         off = float(_off(mass[one], regressors[one] @ rest.coefficients))
         if off < max(STRANGE, FAR * usual) or not _amid(regressors, one, others):
