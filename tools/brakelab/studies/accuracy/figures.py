@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakelab.arrays import Vector
-from brakelab.plant.description import read_file
+from brakelab.plant.description import load_plant, nominal, read_file
 from brakelab.plant.linings import Linings
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel, write_chart
 from brakelab.results.processes import run_each
@@ -17,6 +17,7 @@ from brakelab.simulation.accuracy import AXLES, LOWEST_SPEED, achieved_decel, co
 from brakelab.simulation.closed_loop import Drive, FrictionOverride, new_loop, run
 from brakelab.simulation.configured import configured, shipped
 from brakelab.simulation.scenario import Scenario
+from brakelab.studies.physics import tyre
 from brakelab.studies.physics.heat import heat_panels
 from brakelab.studies.study import Asked, Measured, Study
 from ecu.contract.signals import CORNERS
@@ -169,8 +170,10 @@ TEXT: Final = (
     "![Figures 5.4 to 5.6](images/figures-blending.svg)\n\n"
     "![Figures 6.1 and 6.2](images/figures-pedal.svg)\n\n![Figure 1.5](images/figures-error.svg)\n\n"
     "![Figures 3.6b, 3.7 and 3.8](images/figures-disc.svg)\n\n"
+    "![Figures 4.7, A.5, A.6 and A.10b](images/figures-tyre.svg)\n\n"
     "The mean of an axle is drawn, in 4.6 each wheel. Figure 1.5: the controller uses a friction that is "
-    "wrong by so much in stop #1; dashed: 1 / (1 + error)."
+    "wrong by so much in stop #1; dashed: 1 / (1 + error). Figures of the tyre: the undrawn car, front left, "
+    "on a dry road; dashed in 4.7: in proportion to the load (4.35)."
 )
 
 
@@ -188,6 +191,8 @@ def _run(asked: Asked) -> Measured:
                 found += blended({share: drive for share, (drive, _) in zip(SHARES, shares, strict=True)})
             write_chart(folder / f"figures-{name}.svg", found, LEGEND, 3 if name == "loads" else 5)
         write_chart(folder / "figures-disc.svg", heat_panels(linings), DISC, 5)
+        car = nominal(load_plant(resource("config/plant/suv.toml")))
+        write_chart(folder / "figures-tyre.svg", tyre.tyre_panels(car), tyre.LEGEND, 5)
         x = 100.0 * np.array(ERRORS)
         lines = [Line(x, np.array(off), BLUE), Line(x, 100.0 / (1.0 + np.array(ERRORS)) - 100.0, GREY, True)]
         title = "1.5: error of the deceleration [%]"
