@@ -147,11 +147,19 @@ CLOCKS: dict[str, tuple[Callable[[int], int], dict[str, Any]]] = {
     "as it was": (lambda k: 0, {}),
     "set back by 10 s": (
         lambda k: -10 * SECOND * (k >= 100),
-        {"clock_set_back": 2, "first_set_back": "line 101, by 10.0 s"},
+        {"clock_set": 2, "first_set": "line 101, back by 10.0 s"},
     ),
     "set back twice": (
         lambda k: -5 * SECOND * ((k >= 50) + (k >= 150)),
-        {"clock_set_back": 4, "first_set_back": "line 51, by 5.0 s"},
+        {"clock_set": 4, "first_set": "line 51, back by 5.0 s"},
+    ),
+    "set on by an hour": (
+        lambda k: 3600 * SECOND * (k >= 100),
+        {"clock_set": 2, "first_set": "line 101, on by 3600.0 s"},
+    ),
+    "set back by a day": (
+        lambda k: -86_400 * SECOND * (k >= 100),
+        {"clock_set": 2, "first_set": "line 101, back by 86400.0 s"},
     ),
     "one stamp 80 s ahead": (lambda k: 80 * SECOND * (k == 99), {"damaged": 1, "first_damaged": "line 100"}),
     "one stamp 2 s behind": (lambda k: -2 * SECOND * (k == 99), {"damaged": 1, "first_damaged": "line 100"}),
@@ -189,6 +197,22 @@ def test_clocks_that_jump_are_mended_and_reported(
     unlike = {name: value for name, value in vars(quality).items() if value != vars(LogQuality())[name]}
     assert unlike == reported | {"frames": 200 - reported.get("damaged", 0)}
     kept = [k for k in range(200) if k in frames["data"][:, 0]]
-    expected = np.array(true if "clock_set_back" in reported else stamps, object)[kept]
-    # A clock that was set back goes on from the last frame of the same interface, 20 ms before.
-    assert np.abs(frames["stamp_ns"] - expected).max() <= 40_000_000 * ("clock_set_back" in reported)
+    expected = np.array(true if "clock_set" in reported else stamps, object)[kept]
+    # A clock that was set goes on from the last frame of the same interface, 20 ms before.
+    assert np.abs(frames["stamp_ns"] - expected).max() <= 40_000_000 * ("clock_set" in reported)
+
+
+@pytest.mark.parametrize("block_frames", [1 << 14, 50])
+def test_frames_stored_from_the_end_are_read_from_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block_frames: int
+) -> None:
+    monkeypatch.setattr(text_log, "BLOCK_FRAMES", block_frames)
+    lines = [f"(1600000000.{k:03d}000) can{k % 2} 123#{k:02X}\n" for k in range(200)]
+    lines.insert(150, "(1600000000.15")
+    path = tmp_path / "drive.log"
+    path.write_text("".join(f"{line.strip()}\n" for line in reversed(lines)))
+    frames, quality = read(path)
+    assert list(frames["data"][:, 0]) == list(range(200))
+    assert (np.diff(frames["stamp_ns"]) == 1_000_000).all()
+    assert (quality.backwards, quality.frames, quality.damaged) == (True, 200, 1)
+    assert (quality.stamps_backwards, quality.clock_set) == (0, 0)

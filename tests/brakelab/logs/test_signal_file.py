@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from brakelab.logs import signal_batches
+from brakelab.logs.column_map import read_column_map
 from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.signal_file import read_signals
 from ecu.contract.signals import ACCEL_X, INPUT
@@ -257,3 +258,60 @@ def test_a_cr_alone_costs_its_line_and_no_other(tmp_path: Path, row: str) -> Non
     (block,) = read_signals(write(tmp_path / "drive.csv", content), quality)
     assert block.values[[0, -1], 0].tolist() == [1.0, 3.0]
     assert (len(block.t_ns), quality.damaged) == ((3, 0) if row.endswith("\r") else (2, 1))
+
+
+# What stands in column t of rows 0.1 s apart: how often its clock was set, and where first.
+CLOCKS: dict[str, tuple[list[float], int, str]] = {
+    "set back by 2 s": ([0.1 * k - 2.0 * (k >= 30) for k in range(60)], 1, "row 30, back by 1.9 s"),
+    "set on by an hour": ([0.1 * k + 3600.0 * (k >= 30) for k in range(60)], 1, "row 30, on by 3600.1 s"),
+    "set on, then back": (
+        [0.1 * k + 4000.0 * (20 <= k < 40) for k in range(60)],
+        2,
+        "row 20, on by 4000.1 s",
+    ),
+    "seconds of a day, at midnight": ([(86_398.0 + 0.1 * k) % 86_400.0 for k in range(60)], 0, ""),
+}
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+@pytest.mark.parametrize("block_rows", [1 << 16, 25])
+def test_where_a_clock_was_set_time_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, clock: str, block_rows: int
+) -> None:
+    monkeypatch.setattr(signal_batches, "BLOCK_ROWS", block_rows)
+    t, times, place = CLOCKS[clock]
+    path = write(tmp_path / "drive.parquet", {"t": t, "accel_x": [float(k) for k in range(len(t))]})
+    quality = SignalQuality()
+    blocks = list(read_signals(path, quality))
+    read = np.concatenate([block.t_ns for block in blocks])
+    np.testing.assert_allclose(np.diff(read), 1e8, rtol=1e-4)
+    assert np.concatenate([block.values for block in blocks])[:, 0].tolist() == list(range(len(t)))
+    assert (quality.clock_set, quality.first_set) == (times, place)
+
+
+@pytest.mark.parametrize("block_rows", [1 << 16, 25])
+def test_rows_that_stand_twice_count_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block_rows: int
+) -> None:
+    monkeypatch.setattr(signal_batches, "BLOCK_ROWS", block_rows)
+    rows = [*range(60), *range(40, 60), *range(60, 90)]
+    cells: list[float | None] = [None if k % 3 else float(k) for k in rows]
+    path = write(tmp_path / "drive.parquet", {"t": [0.1 * k for k in rows], "accel_x": cells})
+    quality = SignalQuality()
+    blocks = list(read_signals(path, quality))
+    read = np.concatenate([block.t for block in blocks])
+    np.testing.assert_allclose(read, 0.1 * np.arange(90))
+    assert (quality.rows, quality.rows_twice, quality.clock_set) == (90, 20, 0)
+
+
+@pytest.mark.parametrize("date", ["", "28.11.2026 ", "2026-11-28T", "2026-11-28 "])
+def test_a_time_of_day_is_a_time_also_at_midnight(tmp_path: Path, date: str) -> None:
+    stamps = [(86_399.5 + 0.05 * k) % 86_400.0 for k in range(40)]
+    text = [f"{int(s // 3600):02d}:{int(s // 60) % 60:02d}:{s % 60:06.3f}".replace(".", ",") for s in stamps]
+    lines = [f"{date}{clock};{k},5" for k, clock in enumerate(text)]
+    log = write(tmp_path / "fahrt.csv", "\n".join(["Uhrzeit;a", "hh:mm:ss;m/s^2", *lines, ""]))
+    (tmp_path / "map.toml").write_text('[inputs]\naccel_x = { column = "a" }\n')
+    (block,) = read_signals(log, SignalQuality(), read_column_map(tmp_path / "map.toml"))
+    assert block.t[0] == pytest.approx(86_399.5)
+    np.testing.assert_allclose(np.diff(block.t), 0.05, atol=1e-9)
+    assert block.values[:, 0].tolist() == [k + 0.5 for k in range(40)]

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from brakelab.logs.asc import date_ns
 from brakelab.logs.trc import days_ns
 from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
-from ecu.errors import UserError
 
 from .conftest import FD_LENGTHS, assert_is, messages, read
 
@@ -273,9 +272,10 @@ def test_other_trc_lines_are_skipped_and_damage_is_counted(tmp_path: Path, line:
     assert (quality.damaged, quality.first_damaged) == (damaged, "line 5" if damaged else "")
 
 
-def test_an_asc_clock_that_is_set_is_refused_with_its_line(tmp_path: Path) -> None:
+def test_an_asc_clock_that_is_set_goes_on_and_is_told_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "drive.asc"
     lines = "1.0 1  123 Rx d 1 07\n9000.0 1  123 Rx d 1 07\n9000.1 1  123 Rx d 1 07\n"
     path.write_text(ASC.format(base="hex", stamps="absolute") + lines)
-    with pytest.raises(UserError, match="line 8: time jumps by more than an hour"):
-        read(path)
+    frames, quality = read(path)
+    assert frames["stamp_ns"][-1] - frames["stamp_ns"][0] == 100_000_000
+    assert (quality.clock_set, quality.first_set) == (1, "line 8, on by 8999.0 s")

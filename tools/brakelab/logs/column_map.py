@@ -21,12 +21,21 @@ from ecu.errors import UserError, closest
 from ecu.settings.described import describe_keys
 from ecu.settings.toml_file import Unit, describe, read_toml
 
-TIMES: Final = ("t", "time", "timestamp", "timestamps", "interval", "zeit", "elapsed time", "offset")
+TIMES: Final = (
+    *("t", "time", "timestamp", "timestamps", "interval", "zeit", "elapsed time", "offset", "uhrzeit"),
+    *("zeitstempel", "datetime", "date time", "time of day", "utc", "t_s", "time_s"),
+)
 """Names of the column of time, in lower case."""
 LONGEST_LAG_S: Final = 0.5
 """By which an input may come late or early."""
 SECONDS: Final = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6,
                   "μs": 1e-6, "ns": 1e-9, "min": 60.0}  # fmt: skip
+
+
+def seconds_of(unit: str) -> float | None:
+    """Return a unit of time [s], None: of no time; a time of day, `hh:mm:ss`, is read as seconds."""
+    unit = unit.strip().lower()
+    return 1.0 if "h:m" in unit.replace("hh", "h") else SECONDS.get(unit)
 
 
 class _Table(BaseModel):
@@ -147,7 +156,8 @@ def resolve(
     path, content = mapped
     time = time_column(content, str(path), log, names, titles)
     unit = content.time_unit or units.get(time, "") or "s"
-    if unit.strip().lower() not in SECONDS:
+    seconds = seconds_of(unit)
+    if seconds is None:
         raise UserError(
             str(path), "time_unit", f"missing; {log} has {time} in {unit!r}: give s, ms, us or ns"
         )
@@ -162,7 +172,7 @@ def resolve(
             raise UserError(str(path), f"{key}.unit", remedy)
         factor, offset = conversion(given, wanted, content.rolling_radius, str(path), f"{key}.unit")
         uses.append(ColumnUse(column, place, one.factor * factor, one.offset * factor + offset))
-    return FileUse(time, SECONDS[unit.strip().lower()], uses)
+    return FileUse(time, seconds, uses)
 
 
 def time_column(

@@ -1,8 +1,9 @@
 """Quality of a CAN log of any format: damage that its reader meets, stamps that do not fit.
 
 Readers hand over `FrameBlock`s. `checked` counts stamps that repeat or step back and gaps, leaves out the
-single frame whose stamp is far from its neighbours (a flipped bit), lets time go on where the clock was set
-back, and refuses a log whose clock jumps by more than an hour.
+single frame whose stamp is far from its neighbours (a flipped bit), and lets time go on where the clock was
+set, back by more than a second or on by more than an hour. A log that is stored from its end is in memory as
+a whole.
 """
 
 from collections.abc import Iterator
@@ -36,13 +37,13 @@ _STAMPS: Final = np.dtype(
         ("gaps", "i8"),
         ("longest_ns", "i8"),
         ("longest_at", "i8"),  # index of the frame behind the longest gap, if it is in this block
-        ("set_back", "i8"),
-        ("set_back_ns", "i8"),  # by how much the clock was set back first …
-        ("set_back_at", "i8"),  # … and the index, if it is in this block
-        ("jump", "i8"),  # index of the frame from which on the clock is another
+        ("set", "i8"),
+        ("set_ns", "i8"),  # by how much the clock was set first …
+        ("set_at", "i8"),  # … and the index, if it is in this block
+        ("jump", "i8"),  # index of the frame of an interface whose clock is another from the beginning
         ("known", "i8", (256,)),  # by interface, as the two that follow
         ("last_ns", "i8", (256,)),
-        ("shift_ns", "i8", (256,)),  # since its clock was set back
+        ("shift_ns", "i8", (256,)),  # since its clock was set
     ]
 )
 
@@ -50,6 +51,11 @@ _STAMPS: Final = np.dtype(
 def known_date(stamp_ns: int) -> int | None:
     """Return a date [ns] as it is, None where it lies beyond every stamp that a log may have."""
     return stamp_ns if abs(stamp_ns) <= _FARTHEST_NS else None
+
+
+def set_by(seconds: float) -> str:
+    """Return by how much a clock was set, in words."""
+    return f"{'back' if seconds < 0.0 else 'on'} by {abs(seconds):.1f} s"
 
 
 @dataclass
@@ -64,12 +70,23 @@ class Damage:
     """Place and cause, if the end of the log is missing."""
     stamps_repeated: int = 0
     """Against the frame before on the same interface, or the row before."""
+    backwards: bool = False
+    """Whether it is stored from its end, and was read from there."""
+    clock_set: int = 0
+    """How often a clock (of frames: that of an interface) was: back by more than 1 s, on by more than 1 h."""
+    first_set: str = ""
+    """Place of the first of them, and by how much."""
 
     def note_damage(self, count: int, place: str) -> None:
         """Count damage whose first piece is at `place`."""
         if count:
             self.damaged += count
             self.first_damaged = self.first_damaged or place
+
+    def note_clock(self, place: str, seconds: float) -> None:
+        """Count a clock that was set by `seconds` at `place`."""
+        self.clock_set += 1
+        self.first_set = self.first_set or f"{place}, {set_by(seconds)}"
 
 
 @dataclass
@@ -81,8 +98,8 @@ class SignalQuality(Damage):
     unknown_columns: list[str] = field(default_factory=list)
     zero_ns: int | None = None
     """Date of t = 0 as Unix time, if the file says so."""
-    backwards: bool = False
-    """Whether its rows are stored from the end, and were read from there."""
+    rows_twice: int = 0
+    """Rows that stand in the file a second time, and were left out."""
 
 
 @dataclass
@@ -92,10 +109,6 @@ class LogQuality(Damage):
     frames: int = 0
     stamps_backwards: int = 0
     """Against the frame before on the same interface."""
-    clock_set_back: int = 0
-    """How often an interface's clock was, by more than a second."""
-    first_set_back: str = ""
-    """Place of the first of them, and by how much."""
     gaps: int = 0
     """Times of more than a second without any frame."""
     longest_gap_s: float = 0.0
@@ -134,7 +147,7 @@ def _stamp(frames: RecordArray, i: int, state: Record) -> int:
 @kernel
 def _check(frames: RecordArray, kept: NDArray[np.bool_], state: Record, mended: bool, last: bool) -> int:
     """Judge frames until one whose verdict takes those of the next block (`last`: there is none)."""
-    state.longest_at = state.set_back_at = state.jump = -1
+    state.longest_at = state.set_at = state.jump = -1
     for i in range(len(frames)):
         bus = frames[i].bus
         stamp = _stamp(frames, i, state)
@@ -153,12 +166,13 @@ def _check(frames: RecordArray, kept: NDArray[np.bool_], state: Record, mended: 
                 if alone or abs(goes_on - stamp) > MAX_JUMP_NS:
                     kept[i] = False
                     continue
-                state.jump = i
-                return i
-            if step < 0 and state.known[bus]:
-                if state.set_back == 0:
-                    state.set_back_at, state.set_back_ns = i, -step
-                state.set_back += 1
+                if not state.known[bus]:
+                    state.jump = i
+                    return i
+            if (step < 0 or step > MAX_JUMP_NS) and state.known[bus]:
+                if state.set == 0:
+                    state.set_at, state.set_ns = i, step
+                state.set += 1
                 state.shift_ns[bus] -= step
                 stamp = before
         if state.known[bus]:
@@ -184,7 +198,7 @@ def checked(
     `mended` is False for what the daemon recorded: it met the stamps as they are.
 
     Raises:
-        UserError: the clock jumps by more than an hour and stays there, or runs backwards.
+        UserError: two interfaces have clocks more than an hour apart.
     """
     state = new_record(_STAMPS)
     stamps = state[0]
@@ -199,11 +213,10 @@ def checked(
             raise UserError(
                 str(path),
                 _place(block, stamps["jump"]),
-                "time jumps by more than an hour; mend it here or split the log",
+                "this interface's clock is more than an hour off the others'; give each a log of its own",
             )
-        if stamps["set_back_at"] >= 0:
-            seconds = 1e-9 * int(stamps["set_back_ns"])
-            quality.first_set_back = f"{_place(block, stamps['set_back_at'])}, by {seconds:.1f} s"
+        if stamps["set_at"] >= 0:
+            quality.first_set = f"{_place(block, stamps['set_at'])}, {set_by(1e-9 * int(stamps['set_ns']))}"
         if stamps["longest_at"] >= 0:
             quality.longest_gap = _place(block, stamps["longest_at"])
             quality.longest_gap_s = round(1e-9 * int(stamps["longest_ns"]), 6)
@@ -215,18 +228,23 @@ def checked(
             frames = frames[kept]
         quality.stamps_backwards = int(stamps["backwards"])
         quality.stamps_repeated = int(stamps["repeated"])
-        quality.clock_set_back, quality.gaps = int(stamps["set_back"]), int(stamps["gaps"])
+        quality.clock_set, quality.gaps = int(stamps["set"]), int(stamps["gaps"])
         quality.frames += len(frames)
+        if _falls(frames, quality) and not quality.backwards:
+            quality.backwards, quality.frames = True, 0
+            quality.damaged, quality.first_damaged = quality.damaged - len(outliers), ""
+            turned = [FrameBlock(one.frames[::-1], one.places[::-1], one.unit) for one in (block, *blocks)]
+            yield from checked(path, reversed(turned), quality, mended)
+            return
         if len(frames):
-            _refuse_backwards(path, block, frames, quality)
             yield frames
 
 
-def _refuse_backwards(path: Path, block: FrameBlock, frames: RecordArray, quality: LogQuality) -> None:
-    falls = 2 * quality.stamps_backwards > quality.frames and frames["stamp_ns"][-1] < frames["stamp_ns"][0]
-    if falls and quality.frames == len(frames) > _FEW:
-        remedy = "time falls from frame to frame: the log is stored from its end; reverse its order"
-        raise UserError(str(path), _place(block, 0), remedy)
+def _falls(frames: RecordArray, quality: LogQuality) -> bool:
+    """Return whether time falls from frame to frame in the first ones of a log."""
+    first = quality.frames == len(frames) > _FEW
+    falls = first and 2 * quality.stamps_backwards > quality.frames
+    return falls and bool(frames["stamp_ns"][-1] < frames["stamp_ns"][0])
 
 
 def _joined(rest: FrameBlock | None, following: FrameBlock | None) -> FrameBlock | None:

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from brakelab.logs.column_map import SECONDS, FileUse, MappedFile, resolve, time_column
+from brakelab.logs.column_map import SECONDS, FileUse, MappedFile, resolve, seconds_of, time_column
 from brakelab.logs.csv_header import CsvHeader, find_header
 from brakelab.logs.csv_rows import csv_columns, csv_rows
 from brakelab.logs.log_quality import SignalQuality
@@ -96,7 +96,7 @@ def time_of(path: Path, columns: Columns) -> tuple[str, float]:
     if _is_mdf(path):
         return MDF_TIME, 1.0
     time = time_column(None, str(path), path, columns.names, columns.titles)
-    return time, SECONDS.get(columns.units[time].strip().lower() or "s", 1.0)
+    return time, seconds_of(columns.units[time] or "s") or 1.0
 
 
 def rows_of(path: Path, columns: Columns, wanted: Sequence[str], quality: SignalQuality) -> Iterator[Batch]:
@@ -144,6 +144,7 @@ def _parquet_batches(path: Path, quality: SignalQuality) -> Iterator[Batch]:
 
 def _parquet_rows(path: Path, wanted: list[str] | None, quality: SignalQuality) -> Iterator[Batch]:
     """Yield rows of the columns `wanted`; None: of the inputs, after a batch of all names."""
+    done = 0
     try:
         with pq.ParquetFile(path) as source:
             if wanted is None:
@@ -151,13 +152,15 @@ def _parquet_rows(path: Path, wanted: list[str] | None, quality: SignalQuality) 
                 yield _names_only(names)
                 _note_start(source, quality)
                 wanted = [name for name in names if name == "t" or name in INPUT]
-            yield from _numbered(map(_in_seconds, source.iter_batches(BLOCK_ROWS, columns=wanted)))
+            for batch in _numbered(map(_in_seconds, source.iter_batches(BLOCK_ROWS, columns=wanted))):
+                done += batch.rows.num_rows
+                yield batch
     except (pa.ArrowInvalid, OSError, UnicodeDecodeError) as error:
         reason = str(error).splitlines()[0].rstrip(".")
-        if not quality.rows:
+        if not done:
             remedy = f"no readable Parquet file ({reason}); write it again"
             raise UserError(str(path), "", remedy) from None
-        quality.cut = f"row {quality.rows}: cannot be read ({reason}), the rest is missing"
+        quality.cut = f"row {done}: cannot be read ({reason}), the rest is missing"
 
 
 def _in_seconds(batch: pa.RecordBatch) -> pa.RecordBatch:

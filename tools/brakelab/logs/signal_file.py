@@ -17,6 +17,7 @@ from brakelab.arrays import arrow_array
 from brakelab.logs.column_map import ColumnUse, FileUse, MappedFile
 from brakelab.logs.lag import without_lags
 from brakelab.logs.log_quality import MAX_JUMP_NS, SignalQuality
+from brakelab.logs.row_order import FEW_ROWS, in_order, place_of
 from brakelab.logs.sample_block import SampleBlock
 from brakelab.logs.signal_batches import Batch, is_csv, mapped_batches, plain_batches
 from ecu.bus.freshness import input_freshness
@@ -24,7 +25,6 @@ from ecu.contract.records import RecordArray
 from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.errors import UserError
 
-FEW_ROWS: Final = 10  # too few to judge their distance
 SLOWEST_STEP: Final = 1.1  # s, above: no input would stay alive, so t is probably not in seconds
 SLOWEST_S: Final = 0.3
 """Between samples of a signal that still counts as one."""
@@ -48,11 +48,6 @@ def freshness_at_any_rate(timeouts: Mapping[int, float] | None = None) -> Record
         for name in ("timeout_ns", "least_timeout_ns", "patience_ns"):
             freshness[place][name] = round(1e9 * timeout_s)
     return freshness
-
-
-def _place(path: Path, number: int) -> str:
-    """Return how a user finds what `Batch.places` names."""
-    return f"line {number}" if is_csv(path) else f"row {number}"
 
 
 def read_signals(
@@ -80,7 +75,8 @@ def _read(path: Path, quality: SignalQuality, mapped: MappedFile | None) -> Iter
         use, batches = mapped_batches(path, quality, mapped)
     origin_ns: int | None = None
     last_ns = 0
-    for batch, places in _forwards(batches, "t" if use is None else use.time, quality):
+    time, seconds = ("t", 1.0) if use is None else (use.time, use.seconds)
+    for batch, places in in_order(path, batches, time, seconds, quality):
         if use is None:
             known_columns = _known_columns(path, batch.schema.names, quality)
             use = FileUse("t", 1.0, [ColumnUse(name, INPUT[name]) for name in known_columns])
@@ -91,9 +87,9 @@ def _read(path: Path, quality: SignalQuality, mapped: MappedFile | None) -> Iter
         if not known.all():
             if not known.any():
                 remedy = "time is missing or not finite; give t in seconds in every row"
-                raise UserError(str(path), f"{_place(path, places[0])}, t", remedy)
+                raise UserError(str(path), f"{place_of(path, places[0])}, t", remedy)
             missing = np.flatnonzero(~known)
-            quality.note_damage(len(missing), f"{_place(path, places[missing[0]])}, t (missing)")
+            quality.note_damage(len(missing), f"{place_of(path, places[missing[0]])}, t (missing)")
             batch, places, t = batch.filter(arrow_array(known, pa.bool_())), places[known], t[known]
         if not len(t):
             continue
@@ -108,7 +104,7 @@ def _read(path: Path, quality: SignalQuality, mapped: MappedFile | None) -> Iter
             row = int(falling[0])
             raise UserError(
                 str(path),
-                f"{_place(path, places[row])}, t",
+                f"{place_of(path, places[row])}, t",
                 f"time falls by {-1e-9 * steps[row]:g} s to {t[row]:g} s; sort the rows, or split the file"
                 " here if its clock was set back",
             )
@@ -124,7 +120,7 @@ def _read(path: Path, quality: SignalQuality, mapped: MappedFile | None) -> Iter
             if len(infinite):
                 raise UserError(
                     str(path),
-                    f"{_place(path, places[infinite[0]])}, {name}",
+                    f"{place_of(path, places[infinite[0]])}, {name}",
                     "infinite value; write null or NaN where there is no sample",
                 )
         quality.rows += len(t)
@@ -133,32 +129,7 @@ def _read(path: Path, quality: SignalQuality, mapped: MappedFile | None) -> Iter
         yield SampleBlock(np.array(t), t_ns, inputs, values)
     if quality.rows == 0:
         remedy = quality.cut or f"no row that can be read; {_REMEDY}"
-        raise UserError(str(path), quality.first_damaged or _place(path, 2 * is_csv(path)), remedy)
-
-
-def _forwards(batches: Iterator[Batch], time: str, quality: SignalQuality) -> Iterator[Batch]:
-    """Yield the rows of a file in the order of time, also of one that is stored from its end."""
-    for batch in batches:
-        if not batch.rows.num_rows:
-            yield batch
-            continue
-        if not _falls(batch, time):
-            yield batch
-            break
-        quality.backwards = True
-        for rows, places in reversed([batch, *batches]):
-            yield Batch(rows.take(pa.array(np.arange(rows.num_rows)[::-1])), places[::-1])
-    yield from batches
-
-
-def _falls(batch: Batch, time: str) -> bool:
-    """Return whether time falls from row to row."""
-    try:
-        t = batch.rows.column(time).cast(pa.float64()).to_numpy(zero_copy_only=False)
-    except (KeyError, pa.ArrowInvalid, pa.ArrowNotImplementedError):
-        return False
-    steps = np.diff(t[np.isfinite(t)])
-    return len(steps) >= FEW_ROWS and bool((steps <= 0.0).all() and (steps < 0.0).any())
+        raise UserError(str(path), quality.first_damaged or place_of(path, 2 * is_csv(path)), remedy)
 
 
 def check_seconds(path: Path, name: str, t: NDArray[np.float64], or_else: str) -> None:
@@ -189,7 +160,7 @@ def _check_span(
     if len(jumps):
         raise UserError(
             str(path),
-            f"{_place(path, places[jumps[0]])}, t",
+            f"{place_of(path, places[jumps[0]])}, t",
             "time jumps by more than an hour; mend the row or split the file here",
         )
     seconds = np.arange(rows, rows + len(t_ns)) * 1_000_000_000
@@ -197,13 +168,13 @@ def _check_span(
     if len(empty):
         raise UserError(
             str(path),
-            f"{_place(path, places[empty[0]])}, t",
+            f"{place_of(path, places[empty[0]])}, t",
             "so far less than a row a second and more than an hour without any; split the file at its gaps",
         )
 
 
 def _known_columns(path: Path, names: list[str], quality: SignalQuality) -> list[str]:
-    where = _place(path, 1) if is_csv(path) else "columns"
+    where = place_of(path, 1) if is_csv(path) else "columns"
     if "t" not in names:
         raise UserError(str(path), where, f"column t is missing; {_REMEDY}{_OR_MAP}")
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -237,7 +208,7 @@ def _column(
         except ValueError:
             wrong.append(row)
     if wrong:
-        place = f"{_place(path, places[wrong[0]])}, {name}"
+        place = f"{place_of(path, places[wrong[0]])}, {name}"
         reason = f"{str(column[wrong[0]])[:_SHOWN]!r} is no number"
         if len(wrong) == len(column) - column.null_count:
             raise UserError(str(path), place, f"{reason}; leave the cell empty if unknown")

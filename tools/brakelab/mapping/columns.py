@@ -1,17 +1,16 @@
 """Columns of a signal file as series, and the map of columns that is proposed from them."""
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
 
 from brakelab.arrays import Vector
-from brakelab.logs.column_map import LONGEST_LAG_S, SECONDS, TIMES
+from brakelab.logs.column_map import LONGEST_LAG_S, TIMES, seconds_of
 from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.physics.lags import RADIUS, lags
 from brakelab.logs.physics.samples import SAMPLED, Car, InputSeries
+from brakelab.logs.row_order import in_order, numbers
 from brakelab.logs.signal_batches import Columns, columns_of, rows_of, time_of
 from brakelab.logs.signal_file import check_seconds
 from brakelab.mapping.map_text import input_lines, needs_radius, radius_line
@@ -35,10 +34,10 @@ def read_column_series(log: Path, quality: SignalQuality) -> tuple[Columns, list
     time, seconds = time_of(log, columns)
     names = [name for name in columns.names if name != time]
     parts: dict[str, list[Vector]] = {name: [] for name in [time, *names]}
-    batches = rows_of(log, columns, [time, *names], quality)
+    batches = in_order(log, rows_of(log, columns, [time, *names], quality), time, seconds, quality)
     for batch, _ in the_first(batches, lambda one: len(parts) * one.rows.num_rows):
         for name, values in parts.items():
-            values.append(_numbers(batch.column(name)))
+            values.append(numbers(batch.column(name)))
     read = {name: np.concatenate(parts.pop(name) or [np.empty(0)]) for name in [*parts]}
     t = read[time] * seconds
     if not np.isfinite(t).any():
@@ -48,19 +47,6 @@ def read_column_series(log: Path, quality: SignalQuality) -> tuple[Columns, list
     t = t - known[0]
     series = [_series(name, columns.units.get(name, ""), t, read[name]) for name in names]
     return columns, [one for one in series if len(one.t) >= FEWEST_FRAMES]
-
-
-def _numbers(column: "pa.Array[Any]") -> Vector:
-    if pa.types.is_null(column.type):
-        return np.full(len(column), np.nan)
-    if pa.types.is_string(column.type):
-        text = pc.utf8_trim_whitespace(column)
-        number = pc.match_substring_regex(text, r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
-        column = pc.if_else(number, text, pa.scalar(None, pa.string()))
-    try:
-        return np.asarray(column.cast(pa.float64()).to_numpy(zero_copy_only=False), np.float64)
-    except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
-        return np.full(len(column), np.nan)
 
 
 def _series(name: str, unit: str, t: Vector, value: Vector) -> Series:
@@ -101,9 +87,8 @@ def column_map_text(
         "",
     ]
     time = next((name for wanted in TIMES for name in columns.names if name.strip().lower() == wanted), None)
-    unit = columns.units.get(time or "", "").strip()
     if time is not None and columns.header is not None:
-        known = unit.lower() in SECONDS
+        known = seconds_of(columns.units.get(time, "")) is not None
         lines.append(
             f'time = "{time}"' + ("" if known else '\ntime_unit = "s"  # CHECK: the file does not say')
         )

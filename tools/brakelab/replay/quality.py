@@ -105,11 +105,16 @@ def damage_lines(findings: Findings) -> list[str]:
             lines.append(f"{name}: {first}: {found.damaged} damaged {what} skipped, this is the first")
         if found.cut:
             lines.append(f"{name}: {found.cut}")
-    if log.clock_set_back:
-        first = f"{log.clock_set_back} times, this is the first" if log.clock_set_back > 1 else "once"
-        lines.append(
-            f"{name}: {log.first_set_back}: the clock was set back {first}; time goes on as before it"
-        )
+        if found.backwards:
+            lines.append(f"{name}: stored from its end, and read from there")
+        if found.clock_set:
+            often = f"{found.clock_set} times, this is the first" if found.clock_set > 1 else "once"
+            split = "; where the car stood so long, split the log" if ", on by" in found.first_set else ""
+            lines.append(
+                f"{name}: {found.first_set}: the clock was set {often}; time goes on as before it{split}"
+            )
+    if signals.rows_twice:
+        lines.append(f"{name}: {signals.rows_twice} rows stand twice; the second of each was left out")
     if log.stamps_backwards:
         lines.append(
             f"{name}: time steps back at {log.stamps_backwards} frames; they count in the order of the log"
@@ -117,8 +122,6 @@ def damage_lines(findings: Findings) -> list[str]:
     if log.gaps:
         first = f"the longest of {log.gaps} gaps" if log.gaps > 1 else "the only gap"
         lines.append(f"{name}: {log.longest_gap}: no frame for {log.longest_gap_s:.1f} s before, {first}")
-    if signals.backwards:
-        lines.append(f"{name}: stored from its end, and read from there")
     if signals.unknown_columns:
         unknown = signals.unknown_columns
         more = f", … ({len(unknown)} in all)" if len(unknown) > SHOWN else ""

@@ -19,7 +19,8 @@ _DAMAGE: Final = {
     "damaged": "pieces damaged",
     "damaged_lines": "lines damaged",
     "stamps_backwards": "steps back in time",
-    "clock_set_back": "times the clock was set back",
+    "clock_set": "times the clock was set",
+    "rows_twice": "rows twice",
     "gaps": "gaps of more than a second",
     "dropped": "frames dropped by the kernel",
 }
