@@ -12,7 +12,7 @@ from brakelab.logs.log_quality import LogQuality
 from brakelab.logs.physics.line import fit
 from brakelab.mapping.command import map_text, timeout
 from brakelab.mapping.motion import Found, motion_of, wheel_speeds
-from brakelab.mapping.names import corner_of, score, words
+from brakelab.mapping.names import axle_of, corner_of, score, words
 from brakelab.mapping.physics import propose
 from brakelab.mapping.series import Series, read_series
 from brakelab.mapping.torque import brake_torque, stand_in
@@ -42,6 +42,19 @@ NAMES = [
 @pytest.mark.parametrize(("name", "corner", "stem"), NAMES)
 def test_a_name_tells_its_corner(name: str, corner: str, stem: str) -> None:
     assert corner_of(name) == (corner, stem)
+
+
+@pytest.mark.parametrize(
+    ("front", "rear"), [("vorne", "hinten"), ("Vorderachse", "Hinterachse"), ("VA", "HA")]
+)
+def test_german_axles_are_a_pair(front: str, rear: str) -> None:
+    assert axle_of(f"Bremsdruck {front}") == ("front", "bremsdruck")
+    assert axle_of(f"Bremsdruck {rear}") == ("rear", "bremsdruck")
+
+
+@pytest.mark.parametrize("name", ["Gaspedalstellung", "Drosselklappe", "Fahrpedal", "rFahrpedal"])
+def test_a_german_accelerator_is_one(name: str) -> None:
+    assert score(name, "accelerator_position") >= 1.0
 
 
 def test_words_of_a_name() -> None:

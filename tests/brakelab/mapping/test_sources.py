@@ -51,6 +51,12 @@ def test_the_source_of_less_noise_per_bandwidth_is_taken_and_the_other_named(bet
             assert rates in beside[0].evidence
 
 
+def test_two_sources_that_read_alike_are_as_good_as_each_other():
+    here = [*ROAD.wheels.values(), *(stepped("LongAccel", 0.01, message=name) for name in "AB")]
+    (beside,) = [one for one in alternatives(propose(here)[0], here, MOTION) if one.target == "accel_x"]
+    assert "as good: " in beside.evidence
+
+
 def test_of_two_sets_of_wheels_the_rate_decides_where_steps_do_not_matter():
     names = [f"WHEEL_SPEED_{corner}" for corner in ("FL", "FR", "RL", "RR")]
     fine = [

@@ -38,7 +38,20 @@ WORDS: Final = {
     ),
     "pedal_pressed": ("brake", "brk", "bped", "pedal", "pressed", "press", "appl", "drv", "brems"),
     "pedal_position": ("brake", "brk", "bped", "pedal", "pedl", "stroke", "trvl", "position"),
-    "accelerator_position": ("aped", "accelerator", "gas", "throttle", "accel", "pedal", "pedl", "fahrpedal"),
+    "accelerator_position": (
+        *(
+            "aped",
+            "accelerator",
+            "gas",
+            "throttle",
+            "accel",
+            "pedal",
+            "pedl",
+            "fahrpedal",
+            "gaspedal",
+            "drossel",
+        ),
+    ),
     "motor_torque": ("tq", "trq", "torque", "mot", "motor", "whl", "wheel", "prpl", "axle"),
     "abs_active": ("abs", "active", "act", "actv", "brk"),
     "esp_active": ("esp", "esc", "vdc", "vsc", "stab", "active", "act", "actv", "ctl"),
@@ -74,7 +87,10 @@ CHECKING: Final = {"crc", "cs", "checksum", "chk", "chksum", "qf", "qbit"}
 """Words of what a frame says of itself."""
 
 
-_AXLES: Final = {"front": ("front", "frt", "f", "vorn", "va"), "rear": ("rear", "r", "hinten", "ha")}
+_AXLES: Final = {
+    "front": ("front", "frt", "f", "vorn", "vorne", "vorderachse", "va", "v"),
+    "rear": ("rear", "r", "hinten", "hinterachse", "ha", "h"),
+}
 COUNTS: Final = ("", "v", "mv", "volt", "%", "-", "raw", "count", "counts")
 """Units of a pressure that leave its scale open: a sensor's own voltage, a share of its range."""
 

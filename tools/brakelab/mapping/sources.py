@@ -7,7 +7,7 @@ import numpy as np
 from brakelab.arrays import Vector
 from brakelab.logs.physics.line import MOVING, RATE, fit
 from brakelab.logs.physics.samples import Car, Rows
-from brakelab.mapping.candidates import LEAST_CORRELATION, PER_WORD, STEPS
+from brakelab.mapping.candidates import BETTER, LEAST_CORRELATION, PER_WORD, STEPS
 from brakelab.mapping.motion import Found, Motion, contract_unit
 from brakelab.mapping.names import (
     CHECKING,
@@ -92,7 +92,8 @@ def _compared(one: Series, other: Series, correlation: float) -> str:
         f"{1.0 / each.mean_interval:.0f} Hz in steps of {step(each):.3g} {each.unit}".rstrip()
         for each in (one, other)
     )
-    verdict = "worse" if coarseness(other) > coarseness(one) else "better"
+    ratio = coarseness(other) / coarseness(one)
+    verdict = "worse" if ratio > 1.0 / BETTER else "better" if ratio < BETTER else "as good"
     return f"says the same (correlation {correlation:.3f}), {verdict}: {others}, not {own}"
 
 
