@@ -11,7 +11,7 @@ from brakelab.results.brakes import BrakeBook, BrakeRow
 from brakelab.results.prediction import errors, one_scale, running_average
 from ecu.algorithm.estimation.joint.whole_filter import USUAL_SPEED
 from ecu.contract.params import BAR
-from ecu.contract.signals import FAULT, HOLDING, N_OUTPUTS, NOMINAL, OUTPUT
+from ecu.contract.signals import ACCEL_X, FAULT, HOLDING, N_OUTPUTS, NOMINAL, OUTPUT
 from ecu.settings.config import load_config, new_params
 
 MU, SIGMA, PRESSURE, DECEL = 0.42, 0.021, 40.0, 3.5
@@ -308,3 +308,16 @@ def test_one_scale_in_hindsight_is_the_best_of_a_fine_search() -> None:
     found = one_scale(MEASURED, CONFIGURED, REST_OF_IT)
     assert errors(MEASURED, found).mean == pytest.approx(best, abs=1e-4)
     assert len(one_scale([], [], [])) == 0
+
+
+@pytest.mark.parametrize(("mapped", "left_out", "measured"), [(0, "", DECEL), (1, "inputs lost", np.nan)])
+def test_where_no_accelerometer_is_mapped_the_change_of_speed_is_the_measurement(
+    mapped: int, left_out: str, measured: float
+) -> None:
+    params, rows = PARAMS.copy(), braking()
+    params[0]["mapped"][ACCEL_X] = mapped
+    column(rows, "accel_x_road")[:] = np.nan
+    book = BrakeBook(params)
+    book.add(np.arange(len(rows)) * 0.01, rows)
+    assert book.rows[0].left_out == left_out
+    assert book.rows[0].specific_force_mean == pytest.approx(measured, abs=0.02, nan_ok=True)

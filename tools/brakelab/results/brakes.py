@@ -14,7 +14,7 @@ from typing import Annotated, Final, NamedTuple, get_type_hints
 import numpy as np
 
 from brakelab.results.dust import airborne_mass, dust_of
-from brakelab.results.prediction import STANDING, Vector, corners, left_out, mean, predict
+from brakelab.results.prediction import PERIOD, STANDING, Vector, corners, left_out, mean, predict
 from brakelab.results.wear import wear_of
 from ecu.algorithm.monitoring.wear import REGRESSORS
 from ecu.contract.faults import E2E_REJECTIONS, FAULTS, PRESSURE_LOST, WHEEL_SPEED_LOST
@@ -24,7 +24,6 @@ from ecu.contract.signals import CORNERS, FAULT, HOLDING, OBSERVING, OUTPUT
 
 RELEASE_BAR: Final = 1.0  # an application lasts while a pressure is this much above p_0 (contract)
 LOWEST_SPEED: Final = 5.0 / 3.6  # m/s, end of the friction mean (contract)
-PERIOD: Final = 0.01  # s, one row
 LEARNED: Final = "learned"
 HOLDS: Final = WHEEL_SPEED_LOST | PRESSURE_LOST | E2E_REJECTIONS
 """Fault bits that explain why nothing was learned."""

@@ -14,7 +14,8 @@ brake the linings' part is what road and tyres give of it (`bent`).
     specific_force_mean        mean of b - a_x      does not drive against the brakes
     decel_predicted            mean of f over all rows; of a vehicle that stands it is 0
 
-b is the accelerometer's zero as known before. `specific_force_configured` is the first with the configured
+b is the accelerometer's zero as known before; where no accelerometer is mapped the change of speed stands for
+the measurement, the slope of the road in it. `specific_force_configured` is the first with the configured
 friction and mass and without overrun: the prediction of an ECU without learning.
 
 The standard deviation is that of the force of all linings at equal pressures and of the motor torque, and at
@@ -31,10 +32,11 @@ from ecu.algorithm.estimation.friction import DRIVEN
 from ecu.algorithm.estimation.joint.whole_filter import FULL_TORQUE, USUAL_SPEED
 from ecu.contract.params import BAR, GRAVITY
 from ecu.contract.records import RecordArray
-from ecu.contract.signals import N_OUTPUTS, OUTPUT
+from ecu.contract.signals import ACCEL_X, N_OUTPUTS, OUTPUT
 
 Vector = NDArray[np.float64]
 
+PERIOD: Final = 0.01  # s, one row
 STANDING: Final = 0.3  # m/s, below: standstill
 ROLLING: Final = 5.0  # m/s, from which the balance of a car that others brake is judged
 SHORT: Final = 0.5  # s, shorter: a tap on the pedal
@@ -58,7 +60,7 @@ class Prediction(NamedTuple):
     """Part of `force` that is not the linings'."""
     configured_rest: float
     measured: float
-    """Mean specific force, positive braking; NaN: the accelerometer was not usable."""
+    """Mean specific force, positive braking, without an accelerometer deceleration; NaN: input lost."""
     too_few: str
     """Why too few rows count, empty where enough do."""
 
@@ -177,7 +179,11 @@ def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
     configured = _Car(p["mu_nominal"], float(p["mass"]), 0.0)
     speed = rows[:, OUTPUT["vehicle_speed"]]
     decel = mean(np.where(speed > STANDING, sum(_forces(rows, before, learned, params)), 0.0))
-    rows = rows[that_count(rows, before, params)]
+    felt = np.nan_to_num(before[OUTPUT["accel_x_zero"]]) - rows[:, OUTPUT["accel_x_road"]]
+    if not p["mapped"][ACCEL_X] and len(speed) > 1:
+        felt = -np.gradient(speed, PERIOD)
+    counted = that_count(rows, before, params)
+    measured, rows = mean(felt[counted]), rows[counted]
     brakes, rest = map(mean, _forces(rows, before, learned, params))
     configured_brakes, configured_rest = map(mean, _forces(rows, before, configured, params))
     motors = learned.motors * mean((_motor_torques(rows) / p["wheel_radius"]).sum(axis=1)) / mass
@@ -186,10 +192,9 @@ def predict(rows: Vector, before: Vector, params: RecordArray) -> Prediction:
         relative = float(np.mean(corners(before, "sigma_mu_b") / corners(before, "mu_b")))
     sigma = float(np.hypot(relative * brakes, p["sigma_motor_torque"] * motors))
     sigma = max(sigma, float(np.nan_to_num(before[OUTPUT["sigma_overrun"]])))
-    felt = rows[:, OUTPUT["accel_x_road"]] - np.nan_to_num(before[OUTPUT["accel_x_zero"]])
     return Prediction(
         decel, brakes + rest, sigma, configured_brakes + configured_rest, rest, configured_rest,
-        -mean(felt), _too_few(speed, len(rows)),
+        measured, _too_few(speed, len(rows)),
     )  # fmt: skip
 
 
