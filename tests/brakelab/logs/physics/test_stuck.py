@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from brakelab.logs.physics.samples import SAMPLED, InputSeries
-from brakelab.logs.physics.stuck import clipped_accels, clipped_pressures, runs, stuck_wheels
+from brakelab.logs.physics.stuck import clipped_accels, clipped_pressures, runs, stuck_pressures, stuck_wheels
 from ecu.contract.signals import INPUT_SIGNALS
 
 PLACE = {INPUT_SIGNALS[place].name: column for column, place in enumerate(SAMPLED)}
@@ -45,6 +45,26 @@ def test_pressures_that_end_at_one_value(decels: list[float], range_bar: float, 
     line = clipped_pressures(InputSeries(rows), np.gradient(speed, 0.02), np.ones(ROWS, np.bool_))
     assert bool(line) == reported
     assert not reported or "fl fr rl rr stand at 25.0 bar" in line
+
+
+@pytest.mark.parametrize(
+    ("begin", "seconds", "bar", "reported"),
+    [
+        (4.0, 8.0, 30.0, True),
+        (5.5, 4.0, 30.0, True),
+        (5.5, 4.0, 2.0, False),  # released, its zero 2 bar off
+        (3.0, 2.0, 30.0, False),  # the brake is held, without any noise
+    ],
+)
+def test_a_pressure_that_stands_while_the_car_gains_speed(
+    begin: float, seconds: float, bar: float, reported: bool
+) -> None:
+    rows, speed = stops([3.0, 4.0, 5.0])
+    rows[int(50 * begin) : int(50 * (begin + seconds)), PRESSURES] = bar
+    whole = np.ones(ROWS, np.bool_)
+    line, clear = stuck_pressures(InputSeries(rows), np.gradient(speed, 0.02), whole)
+    assert line.startswith(f"calliper_pressure_*: fl fr rl rr stand at {bar:.1f} bar for") == reported
+    assert clear.all() != reported
 
 
 @pytest.mark.parametrize(("range_", "reported"), [(4.0, True), (6.0, False)])

@@ -18,7 +18,7 @@ from brakelab.arrays import Vector
 from brakelab.logs.physics.line import BRAKING, RATE, fit
 from brakelab.logs.physics.samples import Car, InputSeries, Rows
 from brakelab.logs.physics.sides import Sides, judge_sides
-from brakelab.logs.physics.stuck import clipped_pressures
+from brakelab.logs.physics.stuck import clipped_pressures, stuck_pressures
 from ecu.bus.units import CONVERSIONS
 
 LEAST_ROWS: Final = int(2 * RATE)
@@ -52,6 +52,12 @@ def judge_pressures(series: InputSeries, car: Car, change: Vector, rows: Rows) -
     pressures = series.corners("calliper_pressure")
     if pressures is None:
         return Pressures([], [], [])
+    frozen, rows = stuck_pressures(series, change, rows)
+    found = _judged(series, car, pressures, change, rows)
+    return found._replace(flaws=found.flaws + ([frozen] if frozen else []))
+
+
+def _judged(series: InputSeries, car: Car, pressures: Vector, change: Vector, rows: Rows) -> Pressures:
     checked = ["calliper_pressure"]
     idle = rows & (change > 0.2)
     rest = np.median(pressures[idle], axis=0) if idle.sum() > LEAST_ROWS else np.zeros(4)

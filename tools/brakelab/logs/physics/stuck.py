@@ -96,6 +96,27 @@ def stuck_wheels(series: InputSeries, wheels: Vector, rows: Rows) -> tuple[list[
     return lines, mended
 
 
+def stuck_pressures(series: InputSeries, change: Vector, rows: Rows) -> tuple[str, Rows]:
+    """Return a line if pressures stand at one value while the car gains speed, else none; and the other rows.
+
+    `change` [m/s^2] is that of the car's speed, shape (n,).
+    """
+    stands, seconds, clear = {}, 0.0, rows.copy()
+    for corner in CORNERS:
+        values = series.raw(f"calliper_pressure_{corner}")
+        constant = np.concatenate(([False], np.diff(values) == 0.0)) & rows & (values > LEAST_BAR)
+        for part in runs(constant, HELD):
+            if np.maximum(change[part], 0.0).sum() / RATE > CHANGED:
+                stands[corner], seconds = float(values[part.start]), (part.stop - part.start) / RATE
+                clear[part] = False
+    if not stands:
+        return "", rows
+    bar = " and ".join(f"{value:.1f}" for value in sorted(set(stands.values())))
+    message = f"calliper_pressure_*: {' '.join(stands)} stand at {bar} bar for {seconds:.0f} s"
+    remedy = "the sensor or its gateway is frozen; mend it, or leave that part out"
+    return f"{message} while the car gains speed: {remedy}", clear
+
+
 def clipped_pressures(series: InputSeries, change: Vector, rows: Rows) -> str:
     """Return a line if pressures stand at one greatest value in brakings of different strength, else none.
 
