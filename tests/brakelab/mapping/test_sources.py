@@ -57,6 +57,14 @@ def test_two_sources_that_read_alike_are_as_good_as_each_other():
     assert "as good: " in beside.evidence
 
 
+def test_a_speed_over_ground_beside_wheels_is_named():
+    here = [*ROAD.wheels.values(), *(series(name, ROAD.speed, "m/s") for name in ("GPS_Speed", "DashSpeed"))]
+    found, _ = propose(here)
+    listed = [one for one in undecided(found, here, MOTION, ANY_CAR) if one.target == "vehicle_speed"]
+    assert [one.series.signal for one in listed] == ["GPS_Speed"]
+    assert "correlation +1.00 with the wheels" in listed[0].evidence
+
+
 def test_of_two_sets_of_wheels_the_rate_decides_where_steps_do_not_matter():
     names = [f"WHEEL_SPEED_{corner}" for corner in ("FL", "FR", "RL", "RR")]
     fine = [

@@ -27,6 +27,10 @@ LISTED: Final = 3  # candidates of an input
 ENOUGH: Final = 2.0 * RATE  # rows that tell anything
 
 
+OVER_GROUND: Final = {"gps", "gnss", "gprmc", "ground"}
+"""Words of a speed that is not counted at the wheels."""
+
+
 class Source(NamedTuple):
     """A signal that is not proposed."""
 
@@ -110,10 +114,18 @@ def undecided(found: list[Found], series: list[Series], motion: Motion, car: Car
             looked = [each for one in free if (each := _looked_at(one, target, reference, motion))]
             likely = sorted(looked, key=lambda each: -each[0])[:LISTED]
             sources += [Source(target, one, evidence) for _, one, evidence in likely]
+    if "vehicle_speed" not in targets and "wheel_speed_fl" in targets:
+        ground = [one for one in free if converts(one.unit, "m/s") and OVER_GROUND & {*words(one.signal)}]
+        sources += [Source("vehicle_speed", one, _over_ground(one, motion)) for one in ground[:LISTED]]
     if "abs_active" not in targets:
         named = [one for one in free if one.flag and names_itself(one.signal, "abs_active")]
         sources += [Source("abs_active", one, _how_often(one)) for one in named[:LISTED]]
     return sources
+
+
+def _over_ground(one: Series, motion: Motion) -> str:
+    correlation = fit(motion.smoothed(one), motion.speed, motion.known & motion.near(one)).correlation
+    return f"correlation {correlation:+.2f} with the wheels; it shows slip if its scale and lag are known"
 
 
 def _how_often(flag: Series) -> str:
