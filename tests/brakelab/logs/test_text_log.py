@@ -272,7 +272,7 @@ def test_other_trc_lines_are_skipped_and_damage_is_counted(tmp_path: Path, line:
     assert (quality.damaged, quality.first_damaged) == (damaged, "line 5" if damaged else "")
 
 
-def test_an_asc_clock_that_is_set_goes_on_and_is_told_with_its_line(tmp_path: Path) -> None:
+def test_an_asc_clock_that_is_set_goes_on_and_is_reported_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "drive.asc"
     lines = "1.0 1  123 Rx d 1 07\n9000.0 1  123 Rx d 1 07\n9000.1 1  123 Rx d 1 07\n"
     path.write_text(ASC.format(base="hex", stamps="absolute") + lines)

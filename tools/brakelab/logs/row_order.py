@@ -70,7 +70,7 @@ def numbers(column: "pa.Array[Any]") -> NDArray[np.float64]:
 def in_order(
     path: Path, batches: Iterator[Batch], time: str, seconds: float, quality: SignalQuality
 ) -> Iterator[Batch]:
-    """Yield the rows of a file in the order of time; `quality` is told what was mended.
+    """Yield the rows of a file in the order of time; `quality` is kept up to date.
 
     Args:
         path: the file.
