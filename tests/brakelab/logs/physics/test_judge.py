@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brakelab.logs.physics.judge import judge, range_lines
-from brakelab.logs.physics.samples import ANY_CAR, SAMPLED, Car, Collector, car_of
+from brakelab.logs.physics.samples import ANY_CAR, SAMPLED, Car, Collector, InputSeries, car_of
 from brakelab.logs.signal_file import freshness_at_any_rate
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.configured import shipped
@@ -31,15 +31,19 @@ def right() -> Samples:
     return np.where(inputs["new"][:, SAMPLED] != 0, inputs["value"][:, SAMPLED], np.nan)
 
 
-def lines_of(samples: Samples, car: Car) -> list[str]:
-    """Judge samples; those outside their range are refused before, as `receive` does."""
+def collected(samples: Samples) -> InputSeries:
+    """Collect samples; those outside their range are refused before, as `receive` does."""
     low = np.array([INPUT_SIGNALS[place].low for place in SAMPLED])
     high = np.array([INPUT_SIGNALS[place].high for place in SAMPLED])
     collector = Collector()
     for begin in range(0, len(samples), 4096):
         block = samples[begin : begin + 4096]
         collector.add(np.where((block >= low) & (block <= high), block, np.nan))
-    return judge(collector.series(), car).lines
+    return collector.series()
+
+
+def lines_of(samples: Samples, car: Car) -> list[str]:
+    return judge(collected(samples), car).lines
 
 
 def times(columns: list[int], factor: float, offset: float = 0.0) -> Callable[[Samples], None]:
@@ -202,3 +206,22 @@ def test_pressures_of_a_drive_without_a_braking_are_not_judged(right: Samples, n
     judged = judge(collector.series(), SUV)
     assert not judged.lines
     assert "calliper_pressure" not in judged.checked
+
+
+@pytest.mark.parametrize(
+    ("factor", "car", "line"),
+    [
+        (0.95, SUV, "vehicle_speed: reads 0.95 times what wheels of CONFIG's radii roll; multiply unloaded"),
+        (1.03, SUV, "vehicle_speed: reads 1.03 times what wheels of CONFIG's radii roll; multiply unloaded"),
+        (0.99, SUV, ""),
+        (0.95, ANY_CAR, ""),
+    ],
+)
+def test_radii_of_config_that_a_reference_contradicts(
+    right: Samples, factor: float, car: Car, line: str
+) -> None:
+    samples = right.copy()
+    samples[:, PLACE["vehicle_speed"]] *= factor
+    found = judge(collected(samples), car)
+    assert not found.contradictions
+    assert [one.startswith(line) for one in found.flaws] == [True] * bool(line)

@@ -40,6 +40,7 @@ from ecu.contract.signals import CORNERS, INPUT_SIGNALS
 LOST: Final = 0.3  # below which a signal is another one
 WHEEL: Final = {True: 0.08, False: 0.12}  # tolerated of a wheel among the others, likewise
 ALIKE: Final = 1.25  # two factors within it have one cause
+RADII: Final = 0.02  # by which radii are off that no worn tyre explains
 LEAST_ZERO: Final = 0.35  # m/s^2: a road that falls by less on the mean is usual
 OUTSIDE: Final = 0.02  # of the samples
 
@@ -86,6 +87,8 @@ def judge(series: InputSeries, car: Car) -> Judged:
     relations = relate(series, car, wheels, rows)
     factor, speed_lines = _speed_scale(series, relations, speed, rows, car, measured)
     lines += speed_lines
+    if measured and car.known and not speed_lines:
+        flaws += _radii(series, speed, rows)
     relations = rescaled(relations, factor)
     checked += [name for name in ("accel_x", "yaw_rate", "accel_y") if getattr(relations, name)]
     checked += ["steering_angle"] if relations.steering else []
@@ -177,6 +180,22 @@ def _speed_scale(
             reads = f"vehicle_speed: reads {times(mean)} what both accelerations say"
             return mean, [f"{reads}{unit_of('m/s', 1.0 / mean, CHECK)}"]
     return 1.0, []
+
+
+def _radii(series: InputSeries, speed: Vector, rows: Rows) -> list[str]:
+    """Return the line about a reference that says other radii than CONFIG: learned forces follow it."""
+    if "vehicle_speed" not in series:
+        return []
+    reference = series["vehicle_speed"]
+    there = rows & (reference > MOVING)
+    if there.sum() < LEAST_ROWS:
+        return []
+    factor = float(np.median(speed[there] / reference[there]))
+    if abs(factor - 1.0) < RADII:
+        return []
+    reads = f"vehicle_speed: reads {times(1.0 / factor)} what wheels of CONFIG's radii roll"
+    radii = f"multiply unloaded_radius by {1.0 / factor:.3f}"
+    return [f"{reads}; {radii}, or give this speed factor = {factor:.3f} where it is the one that is off"]
 
 
 def _speed_line(factor: float, car: Car, who: str) -> str:
