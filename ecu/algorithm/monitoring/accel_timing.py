@@ -25,7 +25,7 @@ ACCEL_TIMING_STATE = np.dtype(
     [
         ("reading", "f8"),  # last sample [m/s^2]
         ("same_s", "f8"),  # time for which every sample has been that
-        ("told", "i8"),  # changes of force in a row that have said the same, at most `AGAIN`
+        ("alike", "i8"),  # changes of force in a row that have said the same, at most `AGAIN`
         ("late", "u1"),
     ],
     align=True,
@@ -83,9 +83,9 @@ def _follow_lag(state: Record, mean: Record, witness: Record) -> None:
         return
     compare(witness, ACCEL_X, max(lag, 0.0) * RATE, LATE * RATE)  # early ones: the pressures are late
     said = lag < IN_TIME if state.late else lag > LATE
-    state.told = state.told + 1 if said else 0
-    if state.told == (AGAIN if state.late else SURE):
-        state.late, state.told = 1 - state.late, 0
+    state.alike = state.alike + 1 if said else 0
+    if state.alike == (AGAIN if state.late else SURE):
+        state.late, state.alike = 1 - state.late, 0
         for i in range(MOTOR_TORQUE, MOTOR_TORQUE + 4):
             if state.late:
                 believe(witness, i)  # they were judged by it
@@ -103,7 +103,7 @@ def watch_timing(state: Record, blocks: Record, witness: Record, inputs: Record,
         dt: time since the last cycle [s].
     """
     frozen = _frozen(state, blocks.mean, witness, inputs, dt)
-    if blocks.time == 0.0 and blocks.told_blocks >= BLOCKS:
+    if blocks.time == 0.0 and blocks.compared_blocks >= BLOCKS:
         _follow_lag(state, blocks.mean, witness)
     kept = witness.rejected[ACCEL_X] != 0 and state.same_s > 0.0
     witness.rejected[ACCEL_X] = 1 if frozen or kept or state.late else 0

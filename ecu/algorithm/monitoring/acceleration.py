@@ -62,7 +62,7 @@ ACCELERATION_STATE = np.dtype(
         ("mean", "f8", (BLOCKS, KINDS)),
         ("good_blocks", "i8"),  # in a row
         ("known_blocks", "i8"),  # in a row
-        ("told_blocks", "i8"),  # the same, also since it was believed again
+        ("compared_blocks", "i8"),  # the same, also since it was believed again
         ("sigma", "f8"),  # of a - w by the sensors' noise [m/s^2]
         ("beyond", "i8"),  # consecutive blocks beyond any road
         ("opposed", "i8"),  # consecutive blocks in which it reads forwards while the linings slow the wheels
@@ -164,7 +164,7 @@ def _close_block(params: Record, state: Record) -> None:
     sound = state.good != 0 and state.time < LONGEST_BLOCK_S
     state.good_blocks = state.good_blocks + 1 if sound else 0
     state.known_blocks = state.known_blocks + 1 if sound and state.known else 0
-    state.told_blocks = state.told_blocks + 1 if sound and state.known else 0
+    state.compared_blocks = state.compared_blocks + 1 if sound and state.known else 0
     state.time, state.cycles, state.readings, state.good, state.known = 0.0, 0, 0, 1, 1
 
 

@@ -67,7 +67,7 @@ class Sensor:
             if self.blocks["time"] == 0.0:
                 mean[1:] = mean[:-1].copy()
                 mean[0], sums = 0.1 * sums, np.zeros(4)
-                self.blocks["told_blocks"] = self.blocks["told_blocks"] + 1 if known else 0
+                self.blocks["compared_blocks"] = self.blocks["compared_blocks"] + 1 if known else 0
             watch_timing(self.state, self.blocks, self.witness, self.inputs[0], DT)
             if self.witness["rejected"][ACCEL_X] and found is None:
                 found = self.t
