@@ -10,7 +10,7 @@ from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Line, Panel
 from brakelab.studies.physics.staircase import DT, respond
 
 ROAD: Final = 1.2  # dry (A.2.1)
-SLIPS: Final = np.concatenate([[0.0], np.geomspace(1e-3, 1.0, 120)])
+SLIPS: Final = np.concatenate([[0.0], np.geomspace(1e-3, 0.4, 120)])
 ANGLES: Final = ((0.0, GREY), (2.0, BLUE), (5.0, GREEN), (10.0, ORANGE))  # degrees
 LOADS: Final = (0.5, 1.0, 1.5)
 """Of the nominal one."""
