@@ -89,7 +89,7 @@ LEAST_SPEED = 3.0  # m/s
 WHOLLY = 3.4  # 3 by the brush model, and what nominal friction and load may be off
 LEAST_SLIDING = 0.03  # slip that radii and noise hide
 AHEAD = 0.06  # s: dead time and lag of the hydraulics
-AGAIN, SEEN = 5.0, 0.4  # m/s^2, of the target: of a wheel that is capped already
+AGAIN = 5.0  # m/s^2, of a wheel that is capped already
 STANDS = 0.02  # of the ground's speed
 BACK_S, LEAST_BACK = 0.15, 6.0  # s, m/s^2
 STILL = 0.9  # of what the road carried is carried by a tyre that slips on, until the hydraulics follow
@@ -324,8 +324,7 @@ def guard_slip(
             state.capped[i], state.cap[i] = 1, sent[i]
         if state.capped[i]:
             beyond = lag + AHEAD * state.growth[i] - target
-            again = state.growth[i] > AGAIN + _noise(state, i) and lag > SEEN * target
-            again = again or begins or state.slides[i] != 0
+            again = begins or state.slides[i] != 0 or state.growth[i] > AGAIN + _noise(state, i)
             if watching and beyond > 0.0 and again and not state.denied[i]:
                 least = params.push_out_pressure[i]
                 stands = state.rolled[i] < STANDS * ground

@@ -376,12 +376,3 @@ def test_a_wheel_that_spins_up_on_ice_is_held_until_it_has(wheels: Wheels) -> No
     caps += [wheels.cycle(-0.9 + 15.0 * k * DT / 20.0) for k in range(100)]
     assert not wheels.state["denied"].any()
     assert all(math.isfinite(cap) for cap in caps)
-
-
-def test_noise_alone_does_not_cut_again_what_is_being_given_back(params, feed) -> None:
-    """A wheel that falls by 7.5 m/s^2 for 40 ms from above the car's speed to 1 % of slip at 10 m/s."""
-    wheels = Wheels(params, feed, speed=10.0)
-    wheels.state["capped"][0], wheels.state["cap"][0], wheels.state["grip"][0] = 1, 5.0 * BAR, 5.0 * BAR
-    caps = [wheels.cycle(slip) for slip in (0.02, 0.02, 0.02, 0.0125, 0.005, -0.0025, -0.01, -0.01)]
-    assert wheels.state["slides"][0] == 0
-    assert np.all(np.diff(caps) > 0.0)
