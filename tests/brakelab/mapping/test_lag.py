@@ -16,7 +16,7 @@ from ecu import cli
 from ecu.errors import UserError
 
 CORNERS = ("fl", "fr", "rl", "rr")
-RADIUS = 0.33
+RADIUS = 0.3376  # m, of the front wheels by config/mustang.toml
 MAP = """# A logger's own.
 time = "t"
 [inputs]

@@ -95,7 +95,7 @@ def test_the_loop_gets_what_a_config_file_would_give(calibrated, tmp_path):
         ({"max_pressure_rate": 1499.0}, "control.max_pressure_rate: give a value of at least 1500 bar/s"),
         ({"max_pressure": float("inf")}, "control.max_pressure: give a finite number"),
         ({"max_pressure_rate": struct.unpack("<d", b"\0\0\0\0\0@\xaf@")[0] / 4}, "give a value of at least"),
-        ({"pedal_decel": eight(0, NAN, 3)}, "control.pedal_decel.1: give a finite number"),
+        ({"pedal_decel": eight(0, NAN, 3)}, "control.pedal_decel.2: give a finite number"),
         ({"pedal_decel": eight()}, "control.pedal_decel: give at least 2 values"),
         ({"pedal_decel": eight(0, 0, 1, 0.5, 4, 7, 10)}, "control.pedal_decel: must rise"),
         ({"pedal_decel": eight(0, 2)}, "pedal_position and pedal_decel need the same number of points"),
