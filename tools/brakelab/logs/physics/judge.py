@@ -41,7 +41,7 @@ LOST: Final = 0.3  # below which a signal is another one
 WHEEL: Final = {True: 0.08, False: 0.12}  # tolerated of a wheel among the others, likewise
 ALIKE: Final = 1.25  # two factors within it have one cause
 RADII: Final = 0.02  # by which radii are off that no worn tyre explains
-LATEST: Final = int(0.5 * RATE)  # rows by which a speed comes late at most
+LATENESS: Final = int(0.5 * RATE)  # rows by which a speed may come late
 STEADY: Final = 0.01  # by which a speed may change meanwhile for a late one to be the same
 LEAST_ZERO: Final = 0.35  # m/s^2: a road that falls by less on the mean is usual
 OUTSIDE: Final = 0.02  # of the samples
@@ -189,7 +189,7 @@ def _radii(series: InputSeries, speed: Vector, rows: Rows) -> list[str]:
     if "vehicle_speed" not in series:
         return []
     reference = series["vehicle_speed"]
-    before, after = np.roll(speed, LATEST), np.roll(speed, -LATEST)
+    before, after = np.roll(speed, LATENESS), np.roll(speed, -LATENESS)
     change = np.maximum(np.abs(speed - before), np.abs(after - speed))
     there = rows & (reference > MOVING) & (change < STEADY * speed)
     if there.sum() < LEAST_ROWS:
