@@ -156,14 +156,14 @@ def _one_line(error: Exception) -> str:
 
 
 def _compiled(step: Any, count: int) -> tuple[int, Any]:
-    """Return the address of `step` as a C function (numbers, out, six inputs), and its owner."""
+    """Return the address of `step` as a C function, and its owner."""
     plain = getattr(step, "py_func", step)
     if interprets():
         _PLAIN[len(_PLAIN) + 1] = plain
         return len(_PLAIN), plain
     from brakelab.plant.friction.own_compiled import as_c_function
 
-    return as_c_function(plain, count)
+    return as_c_function(plain, NUMBERS, count)
 
 
 def _call_plain(address: int, row: Any, *inputs: float) -> tuple[float, float]:
