@@ -14,6 +14,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from brakelab.plant.description import Plant, PlantFileError, load_plant
 from brakelab.plant.dynamometer import PRESSURE, STEP, new_stop, run_stop
+from brakelab.plant.friction import ostermeyer_revised
 from brakelab.plant.friction.constant import Constant
 from brakelab.plant.friction.law import ROW, Law, RigBrake, linear_step
 from brakelab.plant.friction.laws import LAWS, friction, law_row
@@ -139,6 +140,21 @@ def test_a_stop_is_the_solution_of_the_laws_equations(suv: Plant, brake: str, na
     assert trace["speed"] == pytest.approx(omega * geometry.tyre_radius, rel=1e-3)
     assert trace["temperature"] == pytest.approx(tau, rel=1e-3)
     assert trace["memory"] == pytest.approx(x, rel=3e-3)
+
+
+@pytest.mark.parametrize("brake", ["A", "B", "C"])
+@pytest.mark.parametrize(("temperature", "as_at"), [(200.0, 200.0), (350.0, 350.0), (550.0, 350.0)])
+def test_revised_ostermeyer_does_not_go_on_beyond_its_hottest_measurement(
+    suv: Plant, brake: str, temperature: float, as_at: float
+) -> None:
+    lining = suv.linings.lining[brake]
+    law = lining.friction["Ost_revised"].model_dump()
+    row = np.array(lining.friction["Ost_revised"].row(lining.brake))
+    pressure, speed = 30e5, 5.0
+    first, second, third = (np.dot(law[key], (1.0, pressure, speed)) for key in ("p_1", "p_2", "p_3"))
+    settled = third * (as_at + 273.15) / (pressure * lining.brake.piston_area * speed + second)
+    _, mu = ostermeyer_revised.step(row, settled, pressure, speed, 0.0, temperature, 1.0 / first)
+    assert mu == pytest.approx(settled, rel=1e-9)
 
 
 @settings(max_examples=200, deadline=None)

@@ -6,8 +6,11 @@ Source. The thesis names a revision with nine parameters and says that the origi
 during a stop and depend on more (2.4.1, 3.6); it gives neither equations nor numbers. That the nine are three
 constants, three pressure and three speed slopes is a conjecture. Of them the shipped sets use four: those of
 Table C.3 with p_3 and its pressure slope fitted to the published column "Ost. imp." of Table 3.4.
+Friction is nearly in proportion to the absolute temperature, to twice what linings have where it is hotter
+than any was measured: it stays there as it is at `hottest`.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Final, Literal
 
@@ -15,7 +18,8 @@ from brakelab.plant.friction.law import KELVIN, Law, Positive, RigBrake, linear_
 from brakelab.plant.jit import Record, kernel
 
 AREA: Final = 1
-FIRST: Final = 2
+HOTTEST: Final = 2
+FIRST: Final = 3
 
 Three = tuple[float, float, float]
 
@@ -28,9 +32,10 @@ class OstermeyerRevised(Law):
     p_2: Three
     p_3: Three
     start: Positive  # mu_b before the first application
+    hottest: Positive = math.inf  # degC, at which it was measured
 
     def row(self, brake: RigBrake) -> Sequence[float]:
-        return (self.start, brake.piston_area, *self.p_1, *self.p_2, *self.p_3)
+        return (self.start, brake.piston_area, self.hottest, *self.p_1, *self.p_2, *self.p_3)
 
 
 @kernel
@@ -54,6 +59,6 @@ def step(
     """Return friction, twice, `dt` [s] later; see the package for the inputs."""
     p_1 = parameter(row, 1, pressure, speed)
     rate = -p_1 * (pressure * row[AREA] * speed + parameter(row, 2, pressure, speed))
-    drive = p_1 * parameter(row, 3, pressure, speed) * (temperature + KELVIN)
+    drive = p_1 * parameter(row, 3, pressure, speed) * (min(temperature, row[HOTTEST]) + KELVIN)
     mu = max(linear_step(memory, rate, drive, dt), 0.0)
     return mu, mu
