@@ -17,7 +17,7 @@ import numpy as np
 
 from brakelab.arrays import Vector
 from brakelab.logs.physics.curves import lateral_lines
-from brakelab.logs.physics.line import MOVING, RATE, Fit
+from brakelab.logs.physics.line import MOVING, RATE, Fit, ranked
 from brakelab.logs.physics.pressures import judge_pressures
 from brakelab.logs.physics.relations import LEAST_ROWS, Relations, relate, rescaled
 from brakelab.logs.physics.samples import SAMPLED, Car, InputSeries, Rows
@@ -73,7 +73,8 @@ def judge(series: InputSeries, car: Car) -> Judged:
         wheels = np.tile(series["vehicle_speed"][:, None], 4)
     else:
         return Judged([], [], [])
-    rows = series.known & (np.median(np.abs(wheels), axis=1) > MOVING)
+    slower, faster = ranked(np.abs(wheels))[1:3]
+    rows = series.known & (0.5 * (slower + faster) > MOVING)
     if rows.sum() < LEAST_ROWS:
         return Judged([], [], [])
     flaws: list[str] = []
@@ -102,8 +103,8 @@ def judge(series: InputSeries, car: Car) -> Judged:
         lines += _longitudinal(relations.accel_x, car, alone)
         flaws += _zero(relations.accel_x, car)
     lines += lateral_lines(relations, car)
-    fastest = np.partition(wheels, 2, axis=1)[:, 2:].mean(axis=1)  # the others may lock
-    change = np.gradient(fastest / factor, 1.0 / RATE)
+    third, fastest = ranked(wheels)[2:]  # the others may lock
+    change = np.gradient(0.5 * (third + fastest) / factor, 1.0 / RATE)
     agrees = relations.accel_x is not None and relations.accel_x.correlation > SIGNED
     if agrees and not any("accel_x" in line for line in lines + flaws):
         change = series["accel_x"]  # slopes of the road and wheels that slip are no matter to it
@@ -133,10 +134,11 @@ def range_lines(freshness: RecordArray) -> list[str]:
 def _wheels(wheels: Vector, rows: Rows, car: Car) -> tuple[list[str], Vector]:
     """Judge the wheels [m/s, shape (n, 4)] by each other; return them with a wrong one as its neighbour."""
     ratios = []
+    moving = wheels[rows]
     for i in range(4):
-        others = np.median(np.delete(wheels[rows], i, axis=1), axis=1)
+        others = ranked(np.delete(moving, i, axis=1))[1]
         roll = np.abs(others) > 0.5
-        ratios.append(float(np.median(wheels[rows, i][roll] / others[roll])))
+        ratios.append(float(np.median(moving[roll, i] / others[roll])))
     wrong = [i for i in range(4) if not abs(ratios[i] - 1.0) <= WHEEL[car.known]]
     if len(wrong) > 1:
         front, rear = float(np.mean(ratios[:2])), float(np.mean(ratios[2:]))

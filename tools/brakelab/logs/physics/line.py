@@ -38,6 +38,19 @@ class Fit(NamedTuple):
         return most < 1.0 / slack or least > slack
 
 
+def ranked(values: Vector) -> list[Vector]:
+    """Return the least of each row, the next, …, each of shape (n,), of `values` of shape (n, few).
+
+    Columns are exchanged as wholes: numpy would sort row by row.
+    """
+    ranks = list(values.T)
+    for end in range(len(ranks) - 1, 0, -1):
+        for i in range(end):
+            one, other = ranks[i], ranks[i + 1]
+            ranks[i], ranks[i + 1] = np.minimum(one, other), np.maximum(one, other)
+    return ranks
+
+
 def smooth(values: Vector) -> Vector:
     """Return the moving mean over `SMOOTH_S` of values on the grid."""
     width = max(int(SMOOTH_S * RATE), 1)

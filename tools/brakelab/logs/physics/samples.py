@@ -159,8 +159,8 @@ class InputSeries:
         return self._raw[name]
 
     def corners(self, stem: str) -> Vector | None:
-        """Return the four of a wheel's quantity, shape (n, 4); None: not all are there."""
+        """Return the four of a wheel's quantity, shape (n, 4), column by column; None: not all are there."""
         names = [f"{stem}_{corner}" for corner in CORNERS]
         if not all(name in self for name in names):
             return None
-        return np.stack([self[name] for name in names], axis=1)
+        return np.stack([self[name] for name in names]).T

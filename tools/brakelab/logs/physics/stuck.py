@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from brakelab.arrays import Vector
-from brakelab.logs.physics.line import RATE, smooth
+from brakelab.logs.physics.line import RATE, ranked, smooth
 from brakelab.logs.physics.samples import InputSeries, Rows
 from brakelab.stretches import stretches
 from ecu.contract.signals import CORNERS
@@ -76,7 +76,7 @@ def stuck_wheels(series: InputSeries, wheels: Vector, rows: Rows) -> tuple[list[
     lines, mended = [], wheels.copy()
     for i, corner in enumerate(CORNERS):
         values = series.raw(f"wheel_speed_{corner}")
-        others = np.median(np.delete(wheels, i, axis=1), axis=1)
+        others = ranked(np.delete(wheels, i, axis=1))[1]
         constant = np.concatenate(([False], np.diff(values) == 0.0)) & rows
         stuck = np.zeros(len(rows), np.bool_)
         for part in runs(constant, HELD):
