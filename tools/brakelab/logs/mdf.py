@@ -302,7 +302,10 @@ def _fill(frames: RecordArray, columns: dict[str, NDArray[Any]], kind: int) -> N
     else:
         length = np.full(len(frames), width)
     frames["length"] = np.clip(length, 0, 64 if kind else min(width, 64))
-    frames["data"][:, : min(width, 64)] = data[:, :64]
-    if len(frames) and frames["length"].min() < min(width, 64):
-        beyond = np.arange(64)[:width] >= frames["length"][:, np.newaxis]
-        frames["data"][:, : min(width, 64)][beyond] = 0
+    width = min(width, 64)
+    payload = f"V{width}"  # copied as one piece, not byte by byte
+    if width:
+        frames["data"][:, :width].view(payload)[:] = data[:, :width].view(payload)
+    if len(frames) and frames["length"].min() < width:
+        beyond = np.arange(width) >= frames["length"][:, np.newaxis]
+        frames["data"][:, :width][beyond] = 0
