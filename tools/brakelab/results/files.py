@@ -44,6 +44,7 @@ _QUICK: Final[dict[str, Any]] = {
     "use_dictionary": False,
     "data_page_version": "2.0",
     "write_statistics": ["t"],
+    "write_batch_size": 1 << 16,  # a block of rows at once
 }
 
 
