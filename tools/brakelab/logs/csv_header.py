@@ -18,7 +18,8 @@ LONGEST_HEAD: Final = 400  # lines in which the table has to begin
 SHOWN: Final = 3  # rows of numbers that make a table
 MOSTLY: Final = 0.7  # of the cells are numbers in a row of the table; half, where the first is one
 _NUMBER: Final = re.compile(
-    r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?|nan|null|NA|(.*[ T])?\d+:\d\d:\d\d([.,]\d+)?Z?",
+    r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?|nan|null|NA|"
+    r"(.*[ T])?\d+:\d\d:\d\d([.,]\d+)?( ?[AP]M| ?Z|[-+]\d\d:?\d\d)?",
     re.IGNORECASE,
 )
 """A cell of a table of numbers, or a time of day."""
