@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from brakelab.identify.manifest import read_manifest
+from brakelab.identify.manifest import measured_rows, read_manifest
 from ecu.errors import UserError
 from tests.brakelab.logs.test_workbook import workbook
 
@@ -74,6 +74,18 @@ def test_a_file_of_columns_renames_a_manifest_s_own_columns(tmp_path: Path, thei
     (tmp_path / "mine.toml").write_text(NAMED.replace("Masse vorher", theirs))
     ((_, row),) = read_manifest(tmp_path / "manifest.csv", tmp_path / "mine.toml")
     assert row == {"block": "kühl", "file": "b1.csv", "mass_before": "905.123"}
+
+
+def test_a_title_above_the_names_and_a_sum_below_the_rows_are_no_measurements(tmp_path: Path) -> None:
+    (tmp_path / "manifest.csv").write_text(f"Pad wear, rig 3\n\n{OWN}Sum;;12,5\n")
+    (tmp_path / "mine.toml").write_text(NAMED)
+    ((line, row),) = measured_rows(tmp_path / "manifest.csv", tmp_path / "mine.toml")
+    assert (line, row["block"], row["mass_before"]) == (4, "kühl", "905.123")
+
+
+def test_without_any_file_every_row_is_kept_to_be_refused(tmp_path: Path) -> None:
+    (tmp_path / "manifest.csv").write_text("block,mass_before\nkühl,905.123\n")
+    assert len(measured_rows(tmp_path / "manifest.csv")) == 1
 
 
 @pytest.mark.parametrize(

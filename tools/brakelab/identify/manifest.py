@@ -30,8 +30,8 @@ _NOTHING: Final = ("-", "–", "n/a", "na", "nan")
 def read_manifest(path: Path, given: Path | None = None) -> list[tuple[int, dict[str, str]]]:
     """Return the rows of a manifest, CSV or .xlsx, each with its line in the file; decimal commas are points.
 
-    Units in brackets behind the names or in a row below them are converted to g, mm and mg; rows without a
-    word count for nothing.
+    Rows above the names, of which one is `file`, are a title. Units in brackets behind the names or in a row
+    below them are converted to g, mm and mg; rows without a word count for nothing.
 
     Args:
         path: of the manifest.
@@ -48,7 +48,12 @@ def read_manifest(path: Path, given: Path | None = None) -> list[tuple[int, dict
         ) from None
     table = sheet_rows(str(path), text) if text.startswith(MAGIC) else _lines(path, text)
     rows = [(line, [cell.strip() for cell in row]) for line, row in table if any(row)]
-    columns = _renamed(path, [split_title(title) for title in rows.pop(0)[1]] if rows else [], given)
+    names = _own_names(given)
+    titles = [[split_title(title) for title in row] for _, row in rows]
+    files = {"file", *(theirs for theirs, ours in names.items() if ours == "file")}
+    head = next((place for place, row in enumerate(titles) if files & {name for name, _ in row}), 0)
+    columns = _renamed(path, titles[head] if rows else [], names)
+    rows = rows[head + 1 :]
     units = [unit for _, unit in columns]
     if rows and _is_units(rows[0][1]):
         units = [
@@ -69,17 +74,30 @@ def _lines(path: Path, text: bytes) -> list[tuple[int, list[str]]]:
         raise UserError(str(path), "", remedy)
     lines = _decoded(text).splitlines(keepends=True)
     skipped = 1 if lines and _SEPARATOR.fullmatch(lines[0].strip()) else 0
-    delimiter = max(",;\t", key="".join(lines[skipped : skipped + 1]).count)
+    delimiter = max(";\t,", key=lambda mark: sum(line.count(mark) > 0 for line in lines[skipped:]))
     table = csv.reader(lines[skipped:], delimiter=delimiter)
     return [(table.line_num + skipped, row) for row in table]
 
 
-def _renamed(path: Path, columns: list[tuple[str, str]], given: Path | None) -> list[tuple[str, str]]:
-    """Return names and units with the names that `given` states as ours."""
+def measured_rows(path: Path, given: Path | None = None) -> list[tuple[int, dict[str, str]]]:
+    """Return the rows of a manifest that name a file, all where none does: sums and means do not.
+
+    Arguments and errors as of `read_manifest`.
+    """
+    rows = read_manifest(path, given)
+    return [row for row in rows if row[1].get("file")] or rows
+
+
+def _own_names(given: Path | None) -> dict[str, str]:
+    """Return our name by theirs, of the columns that `given` states."""
     stated = read_toml(given).get("manifest", {}) if given is not None else {}
     if not isinstance(stated, dict) or not all(isinstance(theirs, str) for theirs in stated.values()):
         raise UserError(str(given), "manifest", 'give a table of names, mass_before = "Masse vorher"')
-    ours = {split_title(theirs)[0]: name for name, theirs in stated.items()}
+    return {split_title(theirs)[0]: name for name, theirs in stated.items()}
+
+
+def _renamed(path: Path, columns: list[tuple[str, str]], ours: dict[str, str]) -> list[tuple[str, str]]:
+    """Return names and units, those of `ours` by our name."""
     found = [name for name, _ in columns]
     if missing := [name for name in ours if name not in found]:
         raise UserError(str(path), missing[0], f"no such column; this manifest has {', '.join(found)}")

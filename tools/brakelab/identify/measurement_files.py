@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from brakelab.arrays import Array
-from brakelab.identify.manifest import NAMES, read_manifest
+from brakelab.identify.manifest import NAMES, measured_rows, read_manifest
 from brakelab.identify.samples import BEYOND, PEAKS, alone, continued
 from brakelab.identify.units import COUNTED, UNITS, ZEROS
 from brakelab.logs.csv_header import find_header
@@ -59,7 +59,11 @@ def open_campaign(
         raise UserError("--axle", axle, "choose front or rear")
     vehicle = load_config(config)
     written = out, out.with_suffix(".md"), out.with_suffix(".svg")
-    rows = read_manifest(manifest, columns)
+    rows = measured_rows(manifest, columns)
+    for line, row in read_manifest(manifest, columns):
+        if (line, row) not in rows:
+            said = ", ".join(cell for cell in row.values() if cell)
+            say(f"{manifest}: line {line} ({said}) names no file, so it is no measurement; left out")
     files = [manifest.parent / row["file"] for _, row in rows if row.get("file")]
     _refuse_repeated(manifest, rows)
     read = [manifest, *files, *config_files(config), *([columns] if columns else [])]
