@@ -2,10 +2,13 @@
 
 import pytest
 
-from brakelab.identify.friction.check import refuse_nonsense
+from brakelab.identify.friction.check import CONFIGURED, Numbers, likeliest, refuse_nonsense, say_unlike
 from brakelab.identify.friction.columns import Columns, DiscGiven, Rig
 from brakelab.identify.friction.recording import Recording
+from brakelab.identify.wear.reader import IN_ORDER
 from ecu.errors import UserError
+from ecu.settings.config import load_config
+from ecu.settings.resources import resource
 
 
 def test_a_sound_recording_passes(recording: Recording, columns: Columns) -> None:
@@ -76,3 +79,25 @@ def test_kelvin_that_a_disc_could_have_is_known_by_its_coldest(
 ) -> None:
     with pytest.raises(UserError, match='reads like K: give the unit "K"'):
         refuse_nonsense(recording._replace(temperature=recording.temperature + 273.15), columns, "cpc.csv")
+
+
+@pytest.mark.parametrize(
+    ("end", "evened", "said"),
+    [
+        (3.8e-4, 1.74e-4, None),  # a thermocouple on the surface, hard stops of some seconds
+        (1e-6, 2.28e-4, None),  # one that is 6 s late
+        (3.8e-4, 3.4e-4, "°F"),
+        (0.4e-4, 0.45e-4, "backing plate"),
+    ],
+)
+def test_a_disc_is_heated_by_what_lies_between_its_rise_at_once_and_evened_out(end, evened, said):
+    columns = Columns.contract(IN_ORDER, "rad/s", load_config(resource("config/suv.toml")), "front")
+    mistake = likeliest(Numbers(0.45, 60.0, end, evened), columns, CONFIGURED)
+    assert (mistake is None) if said is None else (mistake is not None and said in mistake.remedy)
+
+
+def test_a_recording_that_is_heated_unlike_the_others_is_named(capsys):
+    bounds = [(3.8e-4, 1.7e-4), (2.6e-4, 1.8e-4), (5.9e-4, 3.3e-4), (2.1e-4, 0.6e-4), (2.9e-4, 1.8e-4)]
+    say_unlike("abcde", [Numbers(0.45, 60.0, *each) for each in bounds], "manifest.csv", "block")
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("manifest.csv: block c: the same work heats its disc 1.")

@@ -172,6 +172,12 @@ def kelvin(folder: Path) -> None:
     alter(folder / "town-calm.csv", "disc_temperature", lambda degrees: 273.15 + degrees)
 
 
+def late(folder: Path) -> None:
+    path = folder / "town-calm.csv"
+    period = np.median(np.diff(pa_csv.read_csv(path)["t"].to_numpy()))
+    alter(path, "disc_temperature", lambda degrees: np.roll(degrees, round(6.0 / period)))
+
+
 def alike(folder: Path) -> None:
     def change(rows):
         for row in rows:
@@ -319,6 +325,7 @@ BAD = {
     "a thickness that grows": (grown, "the pads grew by"),
     "a mass that grows": (heavier, "pads gained mass"),
     "a temperature in °F": (fahrenheit, "°F"),
+    "a thermocouple 6 s late": (late, "disc_temperature: follows the braking 6.* s late"),
     "a temperature in K": (kelvin, "cannot be degC"),
     "collinear regressors": (alike, "collinear"),
     "a column that is missing": (without_column, "no such column"),

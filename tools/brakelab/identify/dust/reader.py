@@ -24,7 +24,7 @@ from brakelab.identify.dust.features import (
     Recorded,
     extract,
 )
-from brakelab.identify.friction.check import numbers_of, refuse_units
+from brakelab.identify.friction.check import numbers_of, refuse_units, say_unlike
 from brakelab.identify.friction.columns import Columns, load_columns
 from brakelab.identify.friction.reader import in_si
 from brakelab.identify.friction.recording import Recording
@@ -53,7 +53,6 @@ MISSED: Final = 2.5  # of the counter's usual period: longer a gap hides a plume
 LEAST_COUNTED: Final = 0.5  # share of a trip
 FEWEST_TRIPS: Final = 3  # for identification: each is left out once
 FEWEST_APPLICATIONS: Final = 20  # applications of a trip
-UNLIKE: Final = 1.5  # times the heating of the others: rain and wind make a fifth, °F 1.8
 HIGHEST_SPEED: Final = 90.0  # m/s
 HIGHEST_TEMPERATURE: Final = 900.0  # degC
 MOST_COUNT: Final = 1e6  # 1/cm^3; a street has 1e3 to 1e5
@@ -69,7 +68,7 @@ def read_trips(manifest: Path, config: Config, axle: str, given: Path | None = N
     Raises:
         UserError: a file, a row or a value of it is invalid.
     """
-    trips, heating = [], []
+    trips, numbers = [], []
     columns = trip_columns(config, axle, given)
     for line, row in measured_rows(manifest, given):
         if not row.get("trip") or not row.get("file") or row.get("test") not in ("0", "1"):
@@ -86,16 +85,11 @@ def read_trips(manifest: Path, config: Config, axle: str, given: Path | None = N
             many = f"{found.left_out} brake application{'s are' if found.left_out > 1 else ' is'} left out"
             say(f"{path}: particle_concentration: {off_count(trip)}; {many}")
         trips.append(found)
-        heating.append(numbers_of(_applications(trip, columns), columns).heating)
+        numbers.append(numbers_of(*_applications(trip, columns)))
     if sum(not trip.test for trip in trips) < FEWEST_TRIPS:
         remedy = f"give {FEWEST_TRIPS} or more trips with test 0: each is left out once"
         raise UserError(str(manifest), "test", remedy)
-    for one, off in zip(trips, np.array(heating) / np.median(heating), strict=True):
-        if not 1.0 / UNLIKE < off < UNLIKE:
-            say(
-                f"{manifest}: trip {one.trip}: the same work heats its disc {off:.1f} times as much as in "
-                "the other trips; check units and scales of temperature, torque and speed"
-            )
+    say_unlike([trip.trip for trip in trips], numbers, str(manifest), "trip")
     return trips
 
 
@@ -172,23 +166,27 @@ def _read(path: Path, described: Columns) -> dict[str, Array]:
 
 def _check_units(path: Path, trip: Recorded, columns: Columns) -> None:
     """Refuse a brake's columns in other units than they should have."""
-    if applications := _applications(trip, columns):
-        refuse_units(applications, columns, str(path))
+    applications, _, whole = _applications(trip, columns)
+    if applications:
+        refuse_units(applications, columns, str(path), whole)
 
 
-def _applications(trip: Recorded, columns: Columns) -> list[Recording]:
+def _applications(trip: Recorded, columns: Columns) -> tuple[list[Recording], Columns, Recording]:
+    """Return the brake applications of a trip, `columns` and all of it, as `numbers_of` takes them."""
+    whole = Recording(
+        trip.t,
+        1e5 * (trip.pressure + columns.rig.push_out_pressure),
+        trip.torque,
+        trip.speed / columns.brake.tyre_radius,
+        trip.temperature,
+    )
     pressed = stretches((trip.pressure > PRESSED) & (trip.speed > MOVING))
-    return [
-        Recording(
-            trip.t[begin:end],
-            1e5 * (trip.pressure[begin:end] + columns.rig.push_out_pressure),
-            trip.torque[begin:end],
-            trip.speed[begin:end] / columns.brake.tyre_radius,
-            trip.temperature[begin:end],
-        )
+    applications = [
+        Recording(*(values[begin:end] for values in whole))
         for begin, end in pressed
         if (end - begin) * PERIOD >= SHORTEST_APPLICATION
     ]
+    return applications, columns, whole
 
 
 def on_grid(path: Path, name: str, t: Array, values: Array, grid: Array, gaps_pass: bool = False) -> Array:

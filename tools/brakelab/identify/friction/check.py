@@ -6,6 +6,9 @@ Three numbers of a recording have to fit known physics, and every usual mistake 
     inertia   torque impulse over the loss of speed            of the flywheel, or 60 kg m^2 within a factor 4
     heating   rise of the disc over the friction energy, K/J   of the disc, or 0.96 / (8 kg 500 J/(kg K))
 
+What a disc is heated by lies between its rise at the end of a stop, when the surface is ahead of the rest or
+the thermocouple behind it, and that some seconds later, when both have evened out and the air has cooled it.
+
 Recordings of friction have a file of columns, in which a unit is mended; blocks of wear and trips of dust
 have fixed units, to which a column is converted (`refuse_units`).
 """
@@ -15,12 +18,14 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from brakelab.arrays import Vector
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.recording import Recording
 from brakelab.identify.friction.stops import Stops, find_stops
 from brakelab.identify.units import UNITS
 from brakelab.simulation.configured import with_keys
 from ecu.errors import UserError
+from ecu.output import say
 
 USUAL: Final = (0.42, 60.0, 2.4e-4)  # friction, inertia [kg m^2], heating [K/J]
 TOLERANCE: Final = (0.33, 1.4, 0.55)  # standard deviations of the logarithms, where nothing is given
@@ -32,6 +37,15 @@ HIGHEST_TEMPERATURE: Final = 900.0  # degC
 LOWEST_TEMPERATURE: Final = -40.0  # degC
 WARM: Final = 250.0  # degC; no programme keeps a disc above this all the time
 STILL: Final = 1.0  # K in every application, of a thermocouple that does not see the disc
+PRESSED: Final = 1.0  # bar
+EVENED_S: Final = 10.0  # after a stop
+RECORDED_S: Final = 1.0  # between samples; what is further apart was not recorded
+UNLIKE: Final = 1.3  # times the heating of the other recordings: rain and wind make a fifth, °F 1.8
+LATE_S: Final = 2.5  # s behind the braking; a thermocouple that rubs on the disc lags by less than 1 s
+LATEST_S: Final = 20.0
+STEP_S: Final = 0.1
+CLEARLY: Final = 1.3  # times what it follows at once
+SLIGHT: Final = 0.2  # least of what is left of the rise at the end of a stop
 SAMPLES: Final = (1e-4, 0.05)  # s between them, least and greatest
 
 
@@ -84,10 +98,16 @@ class Numbers(NamedTuple):
     friction: float
     inertia: float
     heating: float
+    """By the rise at the end of the stops."""
+    evened: float
+    """By that some seconds later."""
 
 
-def numbers_of(applications: Sequence[Recording], columns: Columns) -> Numbers:
-    """Return the three numbers of brake applications, by those in which the car slows, if any does."""
+def numbers_of(applications: Sequence[Recording], columns: Columns, whole: Recording) -> Numbers:
+    """Return the three numbers of brake applications, by those in which the car slows, if any does.
+
+    `whole`: the recording that they are of, with what is between them.
+    """
     slowing = [one for one in applications if one.speed[-1] < 0.9 * one.speed[0]]
     disc, brake = columns.disc, columns.brake
     push_out, lever = 1e5 * columns.rig.push_out_pressure, 2.0 * brake.piston_area * brake.effective_radius
@@ -101,24 +121,81 @@ def numbers_of(applications: Sequence[Recording], columns: Columns) -> Numbers:
         kept = max(1.0 - 0.5 * rate * float(one.time[-1] - one.time[0]), 0.3)
         work.append(kept * float(np.trapezoid(one.torque * one.speed, one.time)))
         rise.append(float(one.temperature[-1] - one.temperature[0]))
-    hard = np.array(work) >= np.median(work)
-    heating = float(np.sum(np.array(rise)[hard]) / max(np.sum(np.array(work)[hard]), 1e-9))
-    return Numbers(float(np.median(friction)), float(np.median(inertia)), heating)
+    ends = np.array([one.time[-1] for one in slowing or applications])
+    after = _evened(ends, columns, whole)
+    heating, evened = _heating(np.array(work), np.array(rise), after)
+    return Numbers(float(np.median(friction)), float(np.median(inertia)), heating, evened)
 
 
-def refuse_units(applications: Sequence[Recording], columns: Columns, where: str) -> None:
-    """Refuse applications, in the units of a recording, whose columns are in other units than theirs.
+def thermocouple_delay(whole: Recording) -> float:
+    """Return how long after the friction power the disc of a recording warms [s]; 0: about at once."""
+    known = np.isfinite(whole.temperature)
+    step = max(STEP_S, float(np.median(np.diff(whole.time))))
+    grid = np.arange(whole.time[0], whole.time[-1], step)
+    power = np.interp(grid, whole.time, whole.torque * whole.speed)
+    power -= power.mean()
+    rate = np.gradient(np.interp(grid, whole.time[known], whole.temperature[known]))
+    lags = np.arange(min(round(LATEST_S / step), len(grid) - 1))
+    if len(lags) * step <= LATE_S or step > LATE_S:
+        return 0.0
+    follows = np.array([power[: len(grid) - lag] @ rate[lag:] for lag in lags])
+    best = int(np.argmax(follows))
+    soon = follows[: round(LATE_S / step)].max()
+    return step * best if best * step > LATE_S and follows[best] > CLEARLY * soon else 0.0
+
+
+def say_unlike(names: Sequence[str], found: Sequence[Numbers], where: str, what: str) -> None:
+    """Say of which recordings of one disc, blocks or trips, the work heats it as it does in no other."""
+    high = np.maximum([max(one.heating, one.evened) for one in found], 1e-9)
+    low = np.maximum([min(one.heating, one.evened) for one in found], SLIGHT * high)
+    bounds = np.column_stack([low, high])
+    middle = np.sqrt(bounds.prod(axis=1))
+    usual = float(np.median(middle))
+    for name, (least, most), own in zip(names, bounds / usual, middle / usual, strict=True):
+        if least > UNLIKE or most < 1.0 / UNLIKE:
+            say(
+                f"{where}: {what} {name}: the same work heats its disc {own:.1f} times as much as in the "
+                f"other {what}s; check units and scales of temperature, torque and speed"
+            )
+
+
+def _heating(work: Vector, rise: Vector, after: Vector) -> tuple[float, float]:
+    """Return what the harder half of stops heats the disc by [K/J], at their ends and `after` them [K]."""
+    hard = work >= np.median(work)
+    done = max(float(np.sum(work[hard])), 1e-9)
+    return float(np.sum(rise[hard])) / done, float(np.sum((rise + after)[hard])) / done
+
+
+def _evened(ends: Vector, columns: Columns, whole: Recording) -> Vector:
+    """Return what the disc warms by after the `ends` [s] of stops until it is braked again [K]."""
+    known = np.isfinite(whole.temperature)
+    time, heat = whole.time[known], whole.temperature[known]
+    braked = whole.time[whole.pressure > 1e5 * (columns.rig.push_out_pressure + PRESSED)]
+    again = np.append(braked, np.inf)[np.searchsorted(braked, ends + RECORDED_S)]
+    cut = np.append(time[:-1][np.diff(time) > RECORDED_S], time[-1])
+    recorded = cut[np.minimum(np.searchsorted(cut, ends), len(cut) - 1)]
+    until = np.maximum(np.minimum(np.minimum(ends + EVENED_S, again), recorded), ends)
+    return np.asarray(np.interp(until, time, heat) - np.interp(ends, time, heat))
+
+
+def refuse_units(
+    applications: Sequence[Recording], columns: Columns, where: str, whole: Recording
+) -> Numbers:
+    """Return the numbers of applications of a `whole`, in the units of a recording; refuse other units.
 
     Raises:
         UserError: names the column, the finding and the remedy.
     """
-    numbers = numbers_of(applications, columns)
+    numbers = numbers_of(applications, columns, whole)
     if max(float(np.ptp(one.temperature)) for one in applications) < STILL:
         name = columns.columns.temperature[0]
         raise UserError(where, name, "does not rise when the brake is applied; give the disc's thermocouple")
+    if late := thermocouple_delay(whole):
+        remedy = f"follows the braking {late:.1f} s late; shift the column, or take a faster thermocouple"
+        raise UserError(where, columns.columns.temperature[0], remedy)
     mistake = likeliest(numbers, columns, CONFIGURED)
     if mistake is None or mistake.place not in UNITS:  # areas and radii count for nothing here
-        return
+        return numbers
     name, unit = getattr(columns.columns, mistake.place)
     remedy = mistake.remedy.partition(":")[0]
     convert = "give that of both" if "pad" in remedy else f"convert it to {unit}"
@@ -136,9 +213,9 @@ def measure(recording: Recording, columns: Columns, where: str) -> tuple[Numbers
         energy.append(float((stops.torque[begin:end] * stops.speed[begin:end]).sum()) / radius * stops.dt)
         temperature = stops.temperature
         rise.append(temperature[end - few : end].mean() - temperature[begin : begin + few].mean())
-    hard = np.array(energy) >= np.median(energy)
-    heating = float(np.sum(np.array(rise)[hard]) / np.sum(np.array(energy)[hard]))
-    return Numbers(float(np.median(stops.mu)), stops.inertia, heating), stops
+    ends = stops.begin + stops.dt * np.diff(stops.first)
+    heating = _heating(np.array(energy), np.array(rise), _evened(ends, columns, recording))
+    return Numbers(float(np.median(stops.mu)), stops.inertia, *heating), stops
 
 
 def refuse_nonsense(recording: Recording, columns: Columns, where: str) -> Numbers:
@@ -170,22 +247,26 @@ def refuse_nonsense(recording: Recording, columns: Columns, where: str) -> Numbe
 def likeliest(numbers: Numbers, columns: Columns, given: float = GIVEN) -> Mistake | None:
     """Return the mistake that the three numbers show, None if they make sense.
 
-    `given`: standard deviation of the logarithm of a number that `columns` gives.
+    `given`: standard deviation of the logarithm of the disc's heating where `columns` gives it.
     """
     known = (None, columns.rig.inertia, columns.disc.heating)
+    surely = (None, GIVEN, given)
     expected = np.array([one or usual for one, usual in zip(known, USUAL, strict=True)])
-    spread = [usual if one is None else given for one, usual in zip(known, TOLERANCE, strict=True)]
-    off = np.log(np.maximum(numbers, 1e-9)) - np.log(expected)
+    spread = [usual if one is None else by for one, usual, by in zip(known, TOLERANCE, surely, strict=True)]
+    off = np.log(np.maximum(numbers, 1e-9)) - np.log([*expected, expected[2]])
     # The thermocouple lags and the air cools: a disc seems to heat less than it does.
-    off[2] += 0.15
+    off[2:] += 0.15
 
-    def badness(mistake: Mistake) -> float:
-        return float(np.sum(((off - np.log(mistake[:3])) / spread) ** 2))
+    def badness(mistake: Mistake, end_alone: bool = False) -> float:
+        *others, end, evened = off - np.log([*mistake[:3], mistake.heating])
+        heating = end if end_alone else np.clip(0.0, min(end, evened), max(end, evened))
+        return float(np.sum((np.array([*others, heating]) / spread) ** 2))
 
     fine = Mistake(1.0, 1.0, 1.0, "", "")
-    if np.max(np.abs(off / spread)) < DOUBTFUL:
+    worst = np.abs(np.array([*off[:2], np.clip(0.0, min(off[2:]), max(off[2:]))]) / spread)
+    if worst.max() < DOUBTFUL:
         return None
-    best = min(mistakes(columns), key=badness)
+    best = min(mistakes(columns), key=lambda one: badness(one, end_alone=True))
     if badness(best) + CLEARER < badness(fine):
         return best
     return fine._replace(place="brake", remedy="fits no known mistake: check areas, radii, inertia and disc")

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from brakelab.arrays import Array
-from brakelab.identify.friction.check import refuse_units
+from brakelab.identify.friction.check import Numbers, refuse_units, say_unlike
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.reader import read_recording
 from brakelab.identify.friction.recording import Recording
@@ -66,21 +66,23 @@ def read_blocks(manifest: Path, config: Config, axle: str, columns: Path | None 
     rows = measured_rows(manifest, columns)
     if not rows:
         raise UserError(str(manifest), "", "no blocks; give a row with block, file, mass_before, mass_after")
-    return [_block(manifest, line, row, config, axle, columns) for line, row in rows]
+    read = [_block(manifest, line, row, config, axle, columns) for line, row in rows]
+    blocks = [block for block, _ in read]
+    say_unlike([block.name for block in blocks], [numbers for _, numbers in read], str(manifest), "block")
+    return blocks
 
 
 def _block(
     manifest: Path, line: int, row: dict[str, str], config: Config, axle: str, given: Path | None
-) -> Block:
+) -> tuple[Block, Numbers]:
     where = f"line {line}"
     if not row.get("block") or not row.get("file"):
         raise refuse_row(manifest, line, row, "block, file, mass_before and mass_after")
     lost = read_lost(manifest, line, row, getattr(config, axle).pad)
     path = manifest.parent / row["file"]
-    stops, columns = read_stops(path, Columns.contract(IN_ORDER, "rad/s", config, axle), given)
-    if stops:
-        _check_physics(path, stops, columns)
-    if len(stops) < FEWEST_APPLICATIONS:
+    stops, columns, whole = read_stops(path, Columns.contract(IN_ORDER, "rad/s", config, axle), given)
+    numbers = _check_physics(path, stops, columns, whole) if stops else None
+    if numbers is None or len(stops) < FEWEST_APPLICATIONS:
         needed = f"a block needs {FEWEST_APPLICATIONS} or more to wear what can be measured"
         remedy = f"{len(stops)} applications; {needed}"
         raise UserError(str(path), f"block {row['block']}", remedy)
@@ -94,7 +96,7 @@ def _block(
         raise UserError(str(manifest), f"{where}, block {row['block']}", remedy)
     mean = regressors[1] / regressors[0]
     beside = _beside(manifest, where, row, stops, columns.brake.tyre_radius) if row.get("programme") else None
-    return Block(row["block"], len(stops), regressors, lost, float(mean), beside)
+    return Block(row["block"], len(stops), regressors, lost, float(mean), beside), numbers
 
 
 def _beside(
@@ -122,10 +124,10 @@ def _beside(
 
 def read_stops(
     path: Path, contract: Columns, given: Path | None = None
-) -> tuple[list[dict[str, Array]], Columns]:
-    """Return the applications of a block, each by `COLUMNS` with arrays of shape (n,), and their description.
+) -> tuple[list[dict[str, Array]], Columns, dict[str, Array]]:
+    """Return the applications of a block, each by `COLUMNS` with arrays of shape (n,), its description, all.
 
-    It is `contract`, or the file of columns `given` or beside `path`, where there is one.
+    The description is `contract`, or the file of columns `given` or beside `path`, where there is one.
 
     Raises:
         UserError: the file cannot be read or lacks a column.
@@ -147,7 +149,7 @@ def read_stops(
         {name: column[start:end] for name, column in columns.items()} for start, end in stretches(pressed)
     ]
     stops = [stop for stop in stops if stop["t"][-1] - stop["t"][0] >= SHORTEST_APPLICATION]
-    return stops, described
+    return stops, described, columns
 
 
 def stop_regressors(stop: dict[str, Array]) -> Array:
@@ -157,22 +159,24 @@ def stop_regressors(stop: dict[str, Array]) -> Array:
     return regressors_of(torque, omega, stop["disc_temperature"], period, max(round(SLOPE_S / period), 1))
 
 
-def _check_physics(path: Path, stops: list[dict[str, Array]], columns: Columns) -> None:
-    """Refuse columns that have gaps or cannot be in the units that they should have."""
+def _check_physics(
+    path: Path, stops: list[dict[str, Array]], columns: Columns, whole: dict[str, Array]
+) -> Numbers:
+    """Return the numbers of stops; refuse columns that have gaps or cannot be in their units."""
     for name in COLUMNS[1:]:
         everything = np.concatenate([stop[name] for stop in stops])
         if not np.isfinite(everything).all():
             raise UserError(str(path), name, "has gaps while the brake is applied; fill them")
     heat = np.concatenate([stop["disc_temperature"] for stop in stops])
     check_celsius(path, "disc_temperature", heat, HIGHEST_TEMPERATURE)
-    applications = [
-        Recording(
-            stop["t"],
-            1e5 * stop["calliper_pressure"],
-            np.abs(stop["brake_torque"]),
-            np.abs(stop["omega"]),
-            stop["disc_temperature"],
-        )
-        for stop in stops
-    ]
-    refuse_units(applications, columns, str(path))
+    return refuse_units([_recording(stop) for stop in stops], columns, str(path), _recording(whole))
+
+
+def _recording(stop: dict[str, Array]) -> Recording:
+    return Recording(
+        stop["t"],
+        1e5 * stop["calliper_pressure"],
+        np.abs(stop["brake_torque"]),
+        np.abs(stop["omega"]),
+        stop["disc_temperature"],
+    )
