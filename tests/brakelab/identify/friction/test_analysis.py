@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from brakelab.identify.friction.analysis import history_effect, levels, principal_components
-from brakelab.identify.friction.stops import Stops
-from brakelab.identify.friction.tables import component_table
+from brakelab.identify.friction.stops import Stops, some
+from brakelab.identify.friction.tables import component_table, history_line
 
 
 def factorial(stops: Stops, slopes: tuple[float, float, float], noise: float, before: float = 0.0) -> Stops:
@@ -85,3 +85,9 @@ def test_levels_are_separated_wherever_they_lie() -> None:
 def test_the_stop_before_is_found(stops: Stops, effect: float) -> None:
     found = history_effect(factorial(stops, (0.1, 0.4, 0.6), 0.2, effect))
     assert abs(found.slope - effect) < found.half < 0.005
+
+
+def test_twelve_stops_are_too_few_for_what_the_one_before_does(stops: Stops) -> None:
+    found = history_effect(some(stops, np.arange(12)))
+    assert np.isnan(found.slope)
+    assert history_line(found) == "Too few stops to tell what the stop before does to friction."

@@ -1,14 +1,17 @@
 """The disc's heat capacity over temperature, found from what a lagging thermocouple shows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.dynamometer import Noise
-from brakelab.identify.friction.heat_capacity import heat_capacity, undelayed
+from brakelab.identify.friction.heat_capacity import UNSHOWN, heat_capacity, undelayed
 from brakelab.identify.friction.patches import CAPACITY_RISE
 from brakelab.identify.friction.recording import Recording
 from brakelab.identify.friction.stops import Stops, find_stops
+from brakelab.identify.friction.tables import heat_line
 from brakelab.plant.disc import DISC_SHARE
 from brakelab.plant.linings import Lining
 from brakelab.studies.lab.brakes import r1_recording
@@ -51,3 +54,14 @@ def test_a_late_thermocouple_is_put_right_by_the_work(
     else:
         assert np.quantile(before, 0.95) > 25.0
         assert np.quantile(off, 0.95) < 12.0
+
+
+def test_a_thermocouple_that_is_late_by_whole_stops_shows_no_disc(stops: Stops, columns: Columns) -> None:
+    samples = np.diff(stops.first)
+    since = np.arange(samples.sum()) - np.repeat(stops.first[:-1], samples)
+    cooled = np.repeat(stops.start_temperature, samples) - 0.2 * stops.dt * since
+    spoilt = replace(stops, temperature=cooled)
+    found = heat_capacity(spoilt, columns)
+    assert not found.known
+    assert undelayed(spoilt, found, columns) is spoilt
+    assert heat_line(found) == f"Disc: {UNSHOWN}."

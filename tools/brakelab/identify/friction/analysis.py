@@ -5,6 +5,7 @@ shares of variance. In a full factorial the inputs are not correlated, so a shar
 of standardised data are r_i / (R sqrt 2), R^2 the sum of all r^2 (eigenvalues 1 + R, 1, 1, 1 - R).
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -98,7 +99,10 @@ def second_order(inputs: Matrix) -> Matrix:
 
 
 def history_effect(stops: Stops) -> History:
-    """Return the effect of the previous stop's end temperature on mean friction, inputs accounted for."""
+    """Return the effect of the previous stop's end temperature on mean friction, inputs accounted for.
+
+    NaN where the stops are too few for it.
+    """
     ends = np.array([stops.temperature[end - 1] for end in stops.first[1:]])
     terms = second_order(inputs_of(stops))[1:]
     before = ends[:-1] / 100.0
@@ -108,6 +112,8 @@ def history_effect(stops: Stops) -> History:
     found, _, _, _ = np.linalg.lstsq(whole, relative, rcond=None)
     left, left_base = relative - whole @ found, relative - terms @ base
     free = len(relative) - whole.shape[1]
+    if free < 1:
+        return History(math.nan, math.nan, math.nan)
     variance = float(left @ left) / free * np.linalg.pinv(whole.T @ whole)[-1, -1]
     explained = 1.0 - float(left @ left) / float(left_base @ left_base)
     return History(float(found[-1]), float(np.sqrt(variance)) * quantile(free), explained)

@@ -13,7 +13,7 @@ from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.discovered_law import discovered_law
 from brakelab.identify.friction.dynamometer import new_bench
 from brakelab.identify.friction.fit import fit
-from brakelab.identify.friction.heat_capacity import SLOW, heat_capacity, undelayed
+from brakelab.identify.friction.heat_capacity import SLOW, UNSHOWN, heat_capacity, undelayed
 from brakelab.identify.friction.lining_file import write_lining
 from brakelab.identify.friction.page import write_report
 from brakelab.identify.friction.reader import read_recording
@@ -131,7 +131,9 @@ def friction(
     measured = _read(data, columns)
     _need(measured.stops, data[0])
     heat = heat_capacity(measured.stops, measured.columns)
-    if heat.lag > SLOW:
+    if not heat.known:
+        say(f"{data[0]}: {UNSHOWN}; what friction does with temperature cannot be told from it")
+    elif heat.lag > SLOW:
         say(f"{data[0]}: the thermocouple lags {heat.lag:.1f} s: what it has not shown is added by the work")
     measured = measured._replace(stops=undelayed(measured.stops, heat, measured.columns))
     if discover is not None:

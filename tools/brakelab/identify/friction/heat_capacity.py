@@ -5,7 +5,8 @@ Model. A stop with friction energy E raises the disc of heat capacity C(tau) = C
     tau_end - tau_start + cooled = share (E - lag P_end) / C(tau)
 
 cooled: what the air takes at the rate of 3.7; P_end the power at the end, which a thermocouple that lags has
-not shown yet. C_100, rise and lag are found by least squares over all stops; cooling is taken as given.
+not shown yet. C_100, rise and lag are found by least squares over all stops; cooling is taken as given. A lag
+below zero is of a thermocouple on the surface, which is ahead of the disc.
 
 A thermocouple that lags by more than `SLOW` shows a law another disc than it had: friction that falls with
 heat seems to fall with time. What the last seconds have heated is then added to what is shown.
@@ -27,6 +28,12 @@ AT: Final = 100.0  # degC
 AMBIENT: Final = 20.0  # degC
 LAST: Final = 0.8  # s of power that a thermocouple of about half that lag has not shown
 SLOW: Final = 1.0  # s; in a disc one lags by 0.2 to 0.6 s
+UNSHOWN: Final = (
+    "its temperatures do not follow the work of the stops: a thermocouple that is late by whole stops, or "
+    "not in the disc"
+)
+USUAL: Final = 4000.0  # J/K
+FARTHEST: Final = 10.0  # times the usual heat capacity, times its rise of 0.1 % per K
 FEW: Final = 5  # samples of the shown temperature at either end
 
 
@@ -40,6 +47,7 @@ class HeatCapacity(NamedTuple):
     lag: float  # s, of the thermocouple
     temperature: Vector  # (stops,), degC, mean of each
     each: Vector  # (stops,), J/K, of each stop, the lag accounted for
+    known: bool  # the stops show it: by no thermocouple that lags by whole stops
 
 
 def heat_capacity(stops: Stops, columns: Columns) -> HeatCapacity:
@@ -47,6 +55,7 @@ def heat_capacity(stops: Stops, columns: Columns) -> HeatCapacity:
     disc, radius = columns.disc, columns.brake.effective_radius
     to_car = columns.brake.tyre_radius / radius
     energy, last, shown, mean = [], [], [], []
+    lasts = stops.dt * float(np.median(np.diff(stops.first)))
     for begin, end in zip(stops.first[:-1], stops.first[1:], strict=True):
         power = stops.torque[begin:end] * stops.speed[begin:end] / radius
         temperature = stops.temperature[begin:end]
@@ -57,18 +66,21 @@ def heat_capacity(stops: Stops, columns: Columns) -> HeatCapacity:
         shown.append(temperature[-FEW:].mean() - temperature[:FEW].mean() + cooled)
         mean.append(temperature.mean())
     tau, e, p, rise = (np.array(values) for values in (mean, energy, last, shown))
-    scale = np.array([float(rise.sum() / e.sum()), 1.0, 1e-3])
+    scale = np.array([DISC_SHARE / USUAL, 1.0, 1e-3])
+    most = np.array([FARTHEST, lasts, FARTHEST])
 
     def left(scaled: Vector) -> Vector:
         xi, lag, by_heat = scale * scaled
         return np.asarray(xi * (e - lag * p) / (1.0 + by_heat * (tau - AT)) - rise)
 
-    found = least_squares(left, np.array([1.0, 0.0, 0.0]))
+    least = np.array([1.0 / FARTHEST, -lasts, -FARTHEST])
+    found = least_squares(left, np.array([1.0, 0.0, 0.0]), bounds=(least, most))
     free = len(rise) - len(scale)
-    covariance = 2.0 * float(found.cost) / free * np.linalg.inv(found.jac.T @ found.jac)
+    covariance = 2.0 * float(found.cost) / free * np.linalg.pinv(found.jac.T @ found.jac)
     deviations = scale * np.sqrt(np.diag(covariance)) * quantile(free)
     xi, lag, by_heat = (float(value) for value in scale * found.x)
     at_100 = DISC_SHARE / xi
+    known = not found.active_mask[0] and found.active_mask[1] < 1 and float(deviations[0]) < 0.5 * xi
     return HeatCapacity(
         at_100,
         at_100 * float(deviations[0]) / xi,
@@ -77,12 +89,13 @@ def heat_capacity(stops: Stops, columns: Columns) -> HeatCapacity:
         lag,
         tau,
         DISC_SHARE * (e - lag * p) / rise,
+        known,
     )
 
 
 def undelayed(stops: Stops, found: HeatCapacity, columns: Columns) -> Stops:
     """Return the stops with the temperature that the disc had when a lagging thermocouple showed less."""
-    if found.lag < SLOW:
+    if not found.known or found.lag < SLOW:
         return stops
     late = round(found.lag / stops.dt)
     temperature = stops.temperature.copy()

@@ -8,7 +8,7 @@ from brakelab.identify.friction.analysis import Components, History
 from brakelab.identify.friction.choice import Identified, Judged
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.fit import Fitted, replayed
-from brakelab.identify.friction.heat_capacity import HeatCapacity
+from brakelab.identify.friction.heat_capacity import UNSHOWN, HeatCapacity
 from brakelab.identify.friction.profile import profile_interval
 from brakelab.identify.friction.stops import Stops
 from brakelab.plant.friction.law import RigBrake
@@ -148,6 +148,8 @@ def component_table(found: Components) -> Table:
 
 def history_line(found: History) -> str:
     """Return one sentence on the effect of the stop before."""
+    if not np.isfinite(found.slope):
+        return "Too few stops to tell what the stop before does to friction."
     return (
         f"A stop after one that ended 100 K hotter has {100 * found.slope:+.2f} ± {100 * found.half:.2f} % "
         "friction, all else equal."
@@ -156,7 +158,11 @@ def history_line(found: History) -> str:
 
 def heat_line(found: HeatCapacity) -> str:
     """Return one sentence on the disc's heat capacity."""
+    if not found.known:
+        return f"Disc: {UNSHOWN}."
+    late = found.lag > 0.0
+    thermocouple = f"lags {found.lag:.2f} s" if late else f"leads by {-found.lag:.2f} s of the work"
     return (
         f"Disc: {found.at_100:.0f} ± {found.half:.0f} J/K at 100 °C, {100 * found.rise:+.3f} ± "
-        f"{100 * found.rise_half:.3f} % per K; the thermocouple lags {found.lag:.2f} s."
+        f"{100 * found.rise_half:.3f} % per K; the thermocouple {thermocouple}."
     )
