@@ -18,7 +18,7 @@ DRIVES = 20.0  # N m per wheel
 ACCELERATES = 0.5  # m/s^2, by reported torques, from which they are compared with the motion
 DRIVE_MEMORY_S = 60.0
 LEAST_DRIVEN = 10.0  # m^2/s^3, the integral of their square from which they are judged
-LEAST_SHARE, GREATEST_SHARE, MOST_SHARE = 0.75, 1.33, 1.5  # of them that arrives: explained, at most
+LEAST_SHARE, GREATEST_SHARE, MOST_SHARE = 0.75, 1.33, 4.0  # of them that arrives: explained, at most
 LEAST_SPEED = 5.0  # m/s
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.algorithm.estimation.joint.drive import other_decel, torque_share
 from ecu.algorithm.estimation.joint.layout import BIAS, LEVEL, MASS, V
+from ecu.algorithm.estimation.joint.prior import forget_levels
 from ecu.algorithm.estimation.joint.wheel import (
     brake_torque,
     drive_opposes,
@@ -41,6 +42,7 @@ from ecu.algorithm.estimation.joint.whole_filter import (
     ceiling_of,
     correct_by_coasting,
     correct_by_mean,
+    forget_filter,
     per_power,
     published_ceiling,
     restore_filter,
@@ -135,18 +137,22 @@ def _hand_over_scale(state: Record, joint: Record) -> None:
 
 
 @kernel
-def _windows_teach(params: Record, joint: Record) -> bool:
+def _windows_teach(params: Record, state: Record, joint: Record) -> bool:
     apart = wheels_mapped(params) and joint.speed_copies <= COPIES and joint.sliding < 4
-    teach: bool = apart and torques_measured(params, joint) and params.mapped[ACCEL_X] != 0
+    measured = torques_measured(params, joint) and torque_share(state) == 1.0
+    teach: bool = apart and measured and params.mapped[ACCEL_X] != 0
     return teach
 
 
 @kernel
 def begin_whole(params: Record, state: Record, joint: Record) -> None:
     """Begin an application."""
-    alone = not _windows_teach(params, joint)
+    alone = not _windows_teach(params, state, joint)
     if state.alone and not alone:
         _hand_over_scale(state, joint)
+    if not state.alone and torque_share(state) != 1.0:  # windows took all of it for arriving
+        forget_levels(joint)
+        forget_filter(state.filter)
     state.alone = 1 if alone else 0
     state.bent, state.age_s, state.coasting_s, state.common = 0, 0.0, 0.0, joint.sampling.common
     _open_mean(state)
@@ -243,7 +249,7 @@ def add_coasting(params: Record, state: Record, joint: Record, inputs: Record) -
         return False
     state.coasting_s += joint.window.time
     coasts = COASTS_FROM_S <= state.coasting_s <= COASTS_TO_S
-    if not coasts or _windows_teach(params, joint) or not _can_be_judged(params, joint):
+    if not coasts or _windows_teach(params, state, joint) or not _can_be_judged(params, joint):
         return False
     drag = -other_decel(params, joint, params.mass, torque_share(state))
     correct_by_coasting(state.filter, drag, joint.x[V], joint.window.time)

@@ -275,7 +275,9 @@ def test_a_car_that_coasts_for_long_shows_no_more_of_its_drag(bystander: Bystand
         ("what is reported arrives", 1.0, 30.0, 1.0),
         ("a mass that is 10 % off", 0.9, 30.0, 1.0),
         ("40 % of it arrives: torque of a crankshaft", 0.4, 30.0, 0.4),
-        ("twice as much arrives: another engine drives, too", 2.0, 30.0, 1.5),
+        ("twice as much arrives: another engine drives, too", 2.0, 30.0, 2.0),
+        ("2.5 times as much: a scale of the signal that is wrong", 2.5, 30.0, 2.5),
+        ("more than any scale explains", 9.0, 30.0, 4.0),
         ("40 %, but hardly ever driven yet", 0.4, 1.0, 1.0),
     ],
 )
@@ -285,8 +287,9 @@ def test_torques_count_as_long_as_they_explain_the_motion(
     p = bystander.params
     motor = -0.25 * p["mass"] * 2.0 * float(p["wheel_radius"].mean())  # drives with 2 m/s^2
     bystander.joint["unmeasured_s"] = 0.0
+    heavier = 1.0 + bystander.rest(-1.0) - bystander.rest(0.0)  # what turns the wheels
     for _ in range(round(seconds / WINDOW_S)):
-        accel = 2.0 * share - bystander.rest(0.0)
+        accel = (2.0 * share - bystander.rest(0.0)) / heavier
         bystander.window(0.0, -accel, motor)
         compare_drive(p, bystander.state, bystander.joint)
     assert torque_share(bystander.state) == pytest.approx(counts, rel=0.02)
@@ -320,6 +323,39 @@ def test_windows_teach_where_all_torques_and_each_wheel_are_measured(
     bystander.joint["motors"]["samples"], bystander.joint["sliding"] = motors, sliding
     begin_whole(bystander.params, bystander.state, bystander.joint)
     assert bool(bystander.state["alone"]) == alone
+
+
+def _drive(bystander: Bystander, share: float) -> None:
+    """Note of half a minute in which motors drove and a share of their torque arrived."""
+    bystander.state["driven"], bystander.state["arrived"] = 100.0, 100.0 * share
+
+
+@pytest.mark.parametrize(("share", "alone"), [(0.4, True), (2.5, True), (0.9, False)])
+def test_windows_teach_nothing_by_torques_of_which_a_share_arrives(
+    bystander: Bystander, share: float, alone: bool
+) -> None:
+    params, joint = bystander.params, bystander.joint
+    params["mapped"], params["sigma_motor_torque"] = 1, 0.0
+    joint["speed_copies"], joint["differs"], joint["motors"]["samples"] = -1, 1, 1
+    _drive(bystander, share)
+    begin_whole(params, bystander.state, joint)
+    assert bool(bystander.state["alone"]) == alone
+
+
+def test_what_windows_learned_by_torques_that_do_not_arrive_is_forgotten_once(bystander: Bystander) -> None:
+    params, joint, state = bystander.params, bystander.joint, bystander.state
+    params["mapped"], params["sigma_motor_torque"] = 1, 0.0
+    joint["speed_copies"], joint["differs"], joint["motors"]["samples"] = -1, 1, 1
+    begin_whole(params, state, joint)
+    joint["x"][LEVEL : LEVEL + 4], state["filter"]["value"][OVERRUN] = 0.3, 0.02
+    state["filter"]["covariance"][SCALE, SCALE] = BESIDE**2
+    _drive(bystander, 0.4)
+    begin_whole(params, state, joint)
+    assert (joint["x"][LEVEL : LEVEL + 4] == 0.0).all()
+    assert state["filter"]["covariance"][SCALE, SCALE] == PRIOR[SCALE] ** 2
+    state["filter"]["value"][SCALE] = 0.1
+    begin_whole(params, state, joint)
+    assert state["filter"]["value"][SCALE] == 0.1
 
 
 def test_windows_teach_nothing_where_no_accelerometer_is_mapped(bystander: Bystander) -> None:
