@@ -55,6 +55,17 @@ def test_wheels_that_turn_backwards_tell_no_less():
     assert value == pytest.approx(ZERO, abs=3 * sigma)
 
 
+def test_a_standstill_that_is_none_does_not_tell_the_zero():
+    """Wheels that are locked, or whose speed stands still, stand; the accelerometer reads the braking."""
+    windows, steps = windows_of(stands=True)
+    value, sigma = accel_zero(windows, steps, PITCH, closed=False)
+    slides = windows._replace(accel=np.where(windows.standing, 9.8, windows.accel))
+    off, also = accel_zero(slides, steps, PITCH, closed=False)
+    assert value == pytest.approx(ZERO, abs=3 * sigma)
+    assert off == pytest.approx(ZERO, abs=3 * also)
+    assert also < 1.5 * sigma
+
+
 def slalom_on_hills(begin: float):
     """Return windows and steps of a drive with curves from 100 to 150 s, on closed hills of 2400 m."""
     speed = 20.0 + 4.0 * np.sin(2 * np.pi * T / 50.0)

@@ -35,6 +35,7 @@ LEAST_STAND: Final = 2.0  # s
 YAW_STEP: Final = 1e-4  # rad/s, resolution and drift
 BANK: Final = 0.05  # m/s^2, of twenty seconds of road
 FEWEST_WINDOWS: Final = 20  # windows
+GATE: Final = 2.5  # sigma
 
 Estimate = tuple[float, float]
 """A value and its standard deviation."""
@@ -175,9 +176,18 @@ def _standing(windows: Windows, steps: Steps, grade: float) -> list[Estimate]:
 
 
 def _combined(estimates: list[Estimate]) -> Estimate:
-    weights = np.array([1.0 / sigma**2 for _, sigma in estimates])
-    values = np.array([value for value, _ in estimates])
+    """Return the mean by weight; what is far from the median counts with a sigma that puts it at `GATE`."""
+    values, sigmas = np.array(estimates).T
+    far = np.abs(values - values[_middle(values, sigmas)])
+    weights = 1.0 / np.maximum(sigmas, far / GATE) ** 2
     return float(weights @ values / weights.sum()), float(1.0 / np.sqrt(weights.sum()))
+
+
+def _middle(values: Vector, sigmas: Vector) -> int:
+    """Return the place of the median by weight."""
+    order = np.argsort(values)
+    shares = np.cumsum(1.0 / sigmas[order] ** 2)
+    return int(order[np.searchsorted(shares, 0.5 * shares[-1])])
 
 
 def yaw_zero(windows: Windows) -> Estimate | None:
