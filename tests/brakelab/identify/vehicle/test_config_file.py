@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from brakelab.identify.vehicle.config_file import map_toml, offsets, write_vehicle
+from brakelab.identify.vehicle.config_file import map_toml, offsets, unit_scales, write_vehicle
 from brakelab.identify.vehicle.parameters import Parameter
 from brakelab.identify.vehicle.solve import Zeros
+from ecu.contract.params import GRAVITY
 from ecu.errors import UserError
 from ecu.settings.config import load_config
 
@@ -80,7 +81,7 @@ def test_zeros_that_are_sure_become_offsets_of_the_map(tmp_path):
         'calliper_pressure_fl = { message = "B", signal = "P" }  # bar\n'
         'calliper_pressure_fr = { message = "B" }\n'
     )
-    text = map_toml(source, tmp_path / "mine-map.toml", offsets(zeros))
+    text = map_toml(source, tmp_path / "mine-map.toml", offsets(zeros), dict.fromkeys(offsets(zeros), 1.0))
     assert tomllib.loads(text) == {
         "database": "car.dbc",
         "inputs": {
@@ -90,3 +91,28 @@ def test_zeros_that_are_sure_become_offsets_of_the_map(tmp_path):
         },
     }
     assert "  # bar" in text
+
+
+def test_a_zero_is_taken_off_in_the_unit_of_the_map(tmp_path):
+    (tmp_path / "drive.csv").write_text("t [s],ax [g],p [bar],yaw [deg/s]\n0,1,2,3\n0.1,1,2,3\n")
+    columns = tmp_path / "columns.toml"
+    columns.write_text(
+        'time = "t"\n[inputs]\naccel_x = { column = "ax", factor = -1, offset = 0.01 }\n'
+        'yaw_rate = { column = "yaw" }\ncalliper_pressure_fl = { column = "p", unit = "MPa" }\n'
+    )
+    (tmp_path / "car.dbc").write_text(
+        'VERSION ""\nBS_:\nBU_: X\nBO_ 1 A: 8 X\n SG_ AX : 0|16@1- (0.001,0) [0|0] "g" X\n'
+        ' SG_ P : 16|16@1- (0.1,0) [0|0] "kPa" X\n SG_ YAW : 32|16@1- (0.01,0) [0|0] "deg/s" X\n'
+    )
+    frames = tmp_path / "frames.toml"
+    frames.write_text(
+        'database = "car.dbc"\n[inputs]\naccel_x = { message = "A", signal = "AX", offset = 0.01 }\n'
+        'yaw_rate = { message = "A", signal = "YAW" }\n'
+        'calliper_pressure_fl = { message = "A", signal = "P", unit = "MPa" }\n'
+    )
+    zeros = {"accel_x": 0.5 * GRAVITY, "yaw_rate": 0.01, "calliper_pressure_fl": 0.3}
+    for source in (columns, frames):
+        text = map_toml(source, tmp_path / "own.toml", zeros, unit_scales(source, tmp_path / "drive.csv"))
+        own = {name: one["offset"] for name, one in tomllib.loads(text)["inputs"].items()}
+        expected = {"accel_x": -0.49, "yaw_rate": -0.57296, "calliper_pressure_fl": -0.03}
+        assert own == pytest.approx(expected, rel=1e-3)

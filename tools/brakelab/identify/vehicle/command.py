@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from brakelab.identify.vehicle.config_file import map_toml, offsets, write_vehicle
+from brakelab.identify.vehicle.config_file import map_toml, offsets, unit_scales, write_vehicle
 from brakelab.identify.vehicle.cross_check import cross_check, keep_start
 from brakelab.identify.vehicle.page import write_page
 from brakelab.identify.vehicle.parameters import parameters_of
@@ -41,7 +41,7 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
     write_page(page, found, parameters, params[0], names, check.line)
     zeros = offsets(found.zeros)
     if map and zeros:
-        own_map.write_text(map_toml(map, own_map, zeros), encoding="utf-8")
+        own_map.write_text(map_toml(map, own_map, zeros, unit_scales(map, drives[0])), encoding="utf-8")
     give(parameters=parameters, zeros=zeros, cross_check=check)
     for one in parameters:
         unit = "" if one.unit == "-" else f" {one.unit}"

@@ -10,6 +10,13 @@ import tomlkit
 from brakelab.identify.config_file import Section, write_car
 from brakelab.identify.vehicle.parameters import Parameter
 from brakelab.identify.vehicle.solve import Zeros
+from brakelab.logs.column_map import maps_columns, read_column_map
+from brakelab.logs.log_quality import SignalQuality
+from brakelab.logs.signal_batches import mapped_batches
+from ecu.bus.database import find_signal, read_database
+from ecu.bus.signal_map import read_signal_map
+from ecu.bus.units import conversion
+from ecu.contract.signals import INPUT, INPUT_SIGNALS
 from ecu.settings.config import Config, validate_config
 
 SURE: Final = 2.0  # standard deviations: a zero that is one
@@ -94,13 +101,39 @@ def offsets(zeros: Zeros) -> dict[str, float]:
     return sure
 
 
-def map_toml(map: Path, out: Path, zeros: dict[str, float]) -> str:
-    """Return the text of `map` with `zeros` taken off its inputs, for a file `out`."""
+def unit_scales(map: Path, drive: Path) -> dict[str, float]:
+    """Return the unit in which the map has each input, in the contract's; `drive` says those of its columns.
+
+    Raises:
+        UserError: the map or its database is not right.
+    """
+    if maps_columns(map):
+        mapped = read_column_map(map)
+        own = mapped.content.inputs
+        use, _ = mapped_batches(drive, SignalQuality(), mapped)
+        scales = {INPUT_SIGNALS[one.place].name: one.factor for one in use.columns}
+        return {name: scale / own[name].factor for name, scale in scales.items()}
+    content = read_signal_map(map)
+    database = read_database(map.parent / content.database).database
+    scales = {}
+    for name, one in content.inputs.items():
+        signal = find_signal(database.get_message_by_name(one.message), one.signal, map, map, name)
+        unit = one.unit if one.unit is not None else signal.unit or ""
+        wanted = INPUT_SIGNALS[INPUT[name]].unit
+        scales[name] = conversion(unit, wanted, content.rolling_radius, str(map), f"inputs.{name}")[0]
+    return scales
+
+
+def map_toml(map: Path, out: Path, zeros: dict[str, float], scales: dict[str, float]) -> str:
+    """Return the text of `map` with `zeros` taken off its inputs, for a file `out`.
+
+    `scales`: the unit of each input in the contract's.
+    """
     document: Any = tomlkit.parse(map.read_text("utf-8-sig"))
     if "database" in document:
         path = (map.parent / str(document["database"])).resolve()
         document["database"] = Path(os.path.relpath(path, out.resolve().parent)).as_posix()
     for name, zero in zeros.items():
         if source := document["inputs"].get(name):
-            source["offset"] = tomlkit.value(f"{source.get('offset', 0.0) - zero:.5g}")
+            source["offset"] = tomlkit.value(f"{source.get('offset', 0.0) - zero / scales[name]:.5g}")
     return document.as_string()
