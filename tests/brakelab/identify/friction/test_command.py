@@ -212,7 +212,12 @@ def judged(name: str, overall: float, criterion: float) -> Judged:
     ],
 )
 def test_the_choice(laws: list[tuple[str, float, float]], expected: str) -> None:
-    assert choose(tuple(judged(*law) for law in laws)).name == expected
+    assert choose(tuple(judged(*law) for law in laws), 60).name == expected
+
+
+def test_a_law_of_more_numbers_than_stops_is_not_chosen() -> None:
+    laws = judged("a", 3.0, -10.0), judged("stays", 2.8, -20.0)._replace(free=93)
+    assert [choose(laws, stops).name for stops in (60, 315)] == ["a", "stays"]
 
 
 def test_a_law_is_judged_as_it_is_used(

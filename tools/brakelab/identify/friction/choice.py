@@ -8,7 +8,8 @@ Without a programme that was given, the other four fifths count as well as the h
 when hot alone is wrong in most stops. Least error wins; of laws within 5 % of it, the least information
 criterion (Schwarz's, with stops as observations, since the residuals of one stop hang together). But what is
 held out lies 25 K beyond the rest, and a car brakes 100 K hotter than a programme: a law that goes on beyond
-the data must be better by a quarter than every one that stays what it is at their edge.
+the data must be better by a quarter than every one that stays what it is at their edge. A law of more numbers
+than there are stops is not chosen: the samples of one stop hang together, so nothing shows that many.
 """
 
 from collections.abc import Callable, Sequence
@@ -113,7 +114,7 @@ def identify(
     laws = tuple(done[name] for name in names)
     return Identified(
         laws,
-        choose(laws),
+        choose(laws, len(stops)),
         len(stops),
         _span(stops.speed),
         _span(stops.held_pressure),
@@ -161,8 +162,9 @@ def criterion(fitted: Fitted, stops: Stops) -> float:
     return count * float(np.log(mean_square)) + fitted.candidate.size * float(np.log(count))
 
 
-def choose(laws: tuple[Judged, ...]) -> Judged:
-    """Return the law of least error; see above for ties."""
+def choose(laws: tuple[Judged, ...], stops: int) -> Judged:
+    """Return the law of least error, identified on `stops`; see above for ties."""
+    laws = tuple(judged for judged in laws if judged.free <= stops) or laws
     least = min(judged.overall for judged in laws)
     staying = [judged for judged in laws if judged.bounded and judged.overall <= STAYS * least]
     among = staying or laws
