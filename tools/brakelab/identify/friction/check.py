@@ -41,8 +41,8 @@ PRESSED: Final = 1.0  # bar
 EVENED_S: Final = 10.0  # after a stop
 RECORDED_S: Final = 1.0  # between samples; what is further apart was not recorded
 UNLIKE: Final = 1.3  # times the heating of the other recordings: rain and wind make a fifth, °F 1.8
-LATE_S: Final = 2.5  # s behind the braking; a thermocouple that rubs on the disc lags by less than 1 s
-LATEST_S: Final = 20.0
+USUAL_DELAY_S: Final = 2.5  # s behind the braking; a thermocouple that rubs on the disc lags by less than 1 s
+LONGEST_DELAY_S: Final = 20.0
 STEP_S: Final = 0.1
 CLEARLY: Final = 1.3  # times what it follows at once
 SLIGHT: Final = 0.2  # least of what is left of the rise at the end of a stop
@@ -135,13 +135,13 @@ def thermocouple_delay(whole: Recording) -> float:
     power = np.interp(grid, whole.time, whole.torque * whole.speed)
     power -= power.mean()
     rate = np.gradient(np.interp(grid, whole.time[known], whole.temperature[known]))
-    lags = np.arange(min(round(LATEST_S / step), len(grid) - 1))
-    if len(lags) * step <= LATE_S or step > LATE_S:
+    lags = np.arange(min(round(LONGEST_DELAY_S / step), len(grid) - 1))
+    if len(lags) * step <= USUAL_DELAY_S or step > USUAL_DELAY_S:
         return 0.0
     follows = np.array([power[: len(grid) - lag] @ rate[lag:] for lag in lags])
     best = int(np.argmax(follows))
-    soon = follows[: round(LATE_S / step)].max()
-    return step * best if best * step > LATE_S and follows[best] > CLEARLY * soon else 0.0
+    soon = follows[: round(USUAL_DELAY_S / step)].max()
+    return step * best if best * step > USUAL_DELAY_S and follows[best] > CLEARLY * soon else 0.0
 
 
 def say_unlike(names: Sequence[str], found: Sequence[Numbers], where: str, what: str) -> None:

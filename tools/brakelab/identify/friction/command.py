@@ -132,7 +132,7 @@ def friction(
     _need(measured.stops, data[0])
     heat = heat_capacity(measured.stops, measured.columns)
     if not heat.known:
-        say(f"{data[0]}: {UNSHOWN}; what friction does with temperature cannot be told from it")
+        say(f"{data[0]}: {UNSHOWN}; what friction does with temperature cannot be known from it")
     elif heat.lag > SLOW:
         say(f"{data[0]}: the thermocouple lags {heat.lag:.1f} s: what it has not shown is added by the work")
     measured = measured._replace(stops=undelayed(measured.stops, heat, measured.columns))

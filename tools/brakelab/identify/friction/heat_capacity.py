@@ -33,7 +33,7 @@ UNSHOWN: Final = (
     "not in the disc"
 )
 USUAL: Final = 4000.0  # J/K
-FARTHEST: Final = 10.0  # times the usual heat capacity, times its rise of 0.1 % per K
+FROM_USUAL: Final = 10.0  # times the usual heat capacity, times its rise of 0.1 % per K
 FEW: Final = 5  # samples of the shown temperature at either end
 
 
@@ -67,13 +67,13 @@ def heat_capacity(stops: Stops, columns: Columns) -> HeatCapacity:
         mean.append(temperature.mean())
     tau, e, p, rise = (np.array(values) for values in (mean, energy, last, shown))
     scale = np.array([DISC_SHARE / USUAL, 1.0, 1e-3])
-    most = np.array([FARTHEST, lasts, FARTHEST])
+    most = np.array([FROM_USUAL, lasts, FROM_USUAL])
 
     def left(scaled: Vector) -> Vector:
         xi, lag, by_heat = scale * scaled
         return np.asarray(xi * (e - lag * p) / (1.0 + by_heat * (tau - AT)) - rise)
 
-    least = np.array([1.0 / FARTHEST, -lasts, -FARTHEST])
+    least = np.array([1.0 / FROM_USUAL, -lasts, -FROM_USUAL])
     found = least_squares(left, np.array([1.0, 0.0, 0.0]), bounds=(least, most))
     free = len(rise) - len(scale)
     covariance = 2.0 * float(found.cost) / free * np.linalg.pinv(found.jac.T @ found.jac)
