@@ -79,17 +79,17 @@ def _watch_motion(p: Record, s: Record, u: Record, dt: float) -> int:
     watch_timing(s.accel_error.timing, s.acceleration, s.witness, u, dt)
     speeds = s.speeds
     heard = usable(u, VEHICLE_SPEED) and not s.witness.rejected[VEHICLE_SPEED]
-    above = speeds.apart[SPEED] if heard and not over_ground_confirmed(speeds.carried) else math.nan
+    over_wheels = speeds.apart[SPEED] if heard and not over_ground_confirmed(speeds.carried) else math.nan
     if s.witness.rejected[ACCEL_X]:
         s.accel_error.apart = 0.0  # it says nothing of motors either
     elif s.acceleration.time == 0.0:
-        above -= max(tyre_slip(p, estimate.accel_x), 0.0)
+        over_wheels -= max(tyre_slip(p, estimate.accel_x), 0.0)
         across = estimate.accel_y
-        follow_accel_error(p, s.accel_error, s.witness, s.acceleration, across, above, braking)
+        follow_accel_error(p, s.accel_error, s.witness, s.acceleration, across, over_wheels, braking)
     if accel_doubted(s.accel_error):
         faults |= ACCEL_X_DRIFTED
-    above = s.speeds.apart[SPEED] - s.speeds.base[SPEED] if usable(u, VEHICLE_SPEED) else math.nan
-    if all_wheels_scaled(s.accel_error, above, estimate.accel_x):
+    beside_usual = speeds.apart[SPEED] - speeds.base[SPEED] if usable(u, VEHICLE_SPEED) else math.nan
+    if all_wheels_scaled(s.accel_error, beside_usual, estimate.accel_x):
         faults |= ALL_WHEELS
     known = s.accel_error.proven_s > PROVEN_S and not wheels_deny(s.acceleration)
     if known and not pressures_doubted(s.pressures):
