@@ -38,7 +38,8 @@ DISTRIBUTION_STATE = np.dtype(
     [
         ("torque", "f8", (4,)),  # demanded of each wheel [N m], >= 0; NaN without a request
         ("trailing", "f8"),  # share of its torque that the trailing axle keeps, LEAST_TRAILING to 1
-        ("grip", "f8"),  # force over load to which the leading axle takes the rest; 0: none of it
+        ("grip", "f8"),  # force over load to which the leading axle takes the rest
+        ("spent", "u1"),  # a leading wheel has slipped too much: it grows no more in this braking
         ("rolled", "f8", (2,)),  # by a leading wheel over the distance of the ground below it, low-passed
         ("beyond", "f8", (2,)),  # slip of a trailing wheel less that of the leading one, low-passed
         ("offset", "f8", (2,)),  # the same of a rear wheel while rolling freely: error of the radii
@@ -66,7 +67,8 @@ LEAST_SLIP = 0.012  # of a trailing wheel that may lock, beyond that of its forc
 RULED_FROM = 0.15  # z above which Annex 5 orders the axles
 FASTEST_ROLLING = 1.02  # of the ground below it
 GRIP, GRIP_RATE = 0.6, 0.5  # force over load taken over at once, 1/s beyond it
-GRIP_SLIP = 0.05  # of a leading wheel, beyond which it takes nothing until the braking ends
+GRIP_SLIP = 0.05  # of a leading wheel, beyond which it gives back what it took, as long as it does
+RELEASE_S = 0.2  # s: slip follows the hydraulics, and its low-pass
 LONE_SLIP = 0.04  # of a trailing wheel beside one that rolls freely: tyres peak at 0.1 on a dry road
 ROUNDING = 1e-9
 
@@ -198,16 +200,17 @@ def distribute(params: Record, state: Record, mass: float, decel: float, backwar
     front = front_share(params, signed)
     lead = 1.0 - front if backwards else front
     trail = (1.0 - lead) * state.trailing
+    slips = min(state.rolled[0], state.rolled[1]) < 1.0 - GRIP_SLIP
     if not decel > 0.0:
-        state.grip = GRIP
-    elif min(state.rolled[0], state.rolled[1]) < 1.0 - GRIP_SLIP:
-        state.grip = 0.0
-    elif state.grip > 0.0 and state.trailing < 1.0:
+        state.grip, state.spent = GRIP, 0
+    elif not (slips or state.spent) and state.trailing < 1.0:
         state.grip += GRIP_RATE * dt
     if decel > 0.0:
         load = ideal_front_share(params, signed)
-        most = state.grip * (1.0 - load if backwards else load) * GRAVITY / decel
-        lead = max(lead, min(1.0 - trail, most))
+        per_grip = max(1.0 - load if backwards else load, ROUNDING) * GRAVITY / decel
+        lead = max(lead, min(1.0 - trail, state.grip * per_grip))
+        if slips:
+            state.grip, state.spent = min(state.grip, lead / per_grip) * (1.0 - dt / RELEASE_S), 1
     for i in range(4):
         axle = trail if (i < 2) == backwards else lead
         state.torque[i] = 0.5 * axle * mass * decel * params.wheel_radius[i]
