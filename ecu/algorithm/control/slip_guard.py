@@ -10,10 +10,12 @@
 
 begins   slip beyond `RANGE` while the lag grows: the cap is the pressure demanded last
 cut      while the lag that is coming, in `AHEAD`, is beyond that of `slides`: the cap falls to where the
-         wheel comes back to it within `BACK_S`: little where it slips a little, to nothing where it stands
+         wheel comes back to it within `BACK_S`: little where it slips a little, to nothing where it stands.
+         Anew only where it is beyond by `SURE` sigma of noise, or little pressure would never return
 return   then, at once to `RETURNED` of the pressure that the road carried, which is the least while the wheel
          fell behind and the greatest while it came back; from there slowly, ever faster where the wheel rolls
-         beyond it, until the cap no longer acts. Fast where the car is slower than `LEAST_SPEED`
+         beyond it, until the cap no longer acts. Fast where the car is slower than `LEAST_SPEED`. Cap and
+         what the road carries go with the wheel's load: little in a swerve is much after it
 
 The rate is the wheel's own against the accelerometer, not against the vehicle speed: a speed that errs, jumps
 or stands still caps nothing. A wheel that locks falls behind from sample to sample; a wheel speed that jumps
@@ -23,13 +25,7 @@ wheel's speed, `NOISE` sigma, by its second differences. A wheel that brakes no 
 neither falls behind nor comes back for `STEADY_S` is in the stable range of its tyre, or its sensor is
 scaled. The pressure of both returns, and is capped again only where the deficit grows anew.
 
-A rear wheel has no more than `ABOVE_LOW` of what the road carries at the other one (select-low): with ice on
-one side its tyre has the force across that keeps the car's heading.
-
-A rear wheel whose speed is not known is capped by what the road carries at the front wheel of its side, at
-`SLIDING` of that, since frictions differ by axle; on an even road, where both front wheels slip, at `BESIDE`
-of what the other rear wheel carries. One that was pressed harder may stand: it is eased until it has spun up.
-A front wheel that stands costs little force and no stability, so it is left.
+`rear_guard.py` caps rear wheels by what the road carries at others.
 
 While ABS or ESP report activity the cap never falls: two controllers would cut the same wheel. This is no
 ABS: it seeks no optimal slip and has no yaw control.
@@ -42,6 +38,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.brake import brake_gain
+from ecu.algorithm.control.rear_guard import hold_unseen, select_low
 from ecu.algorithm.inputs import fresh, usable
 from ecu.algorithm.lag import lag_gain, settled
 from ecu.algorithm.monitoring.plausibility import SECOND_DIFFERENCE
@@ -64,9 +61,11 @@ SLIP_GUARD_STATE = np.dtype(
         ("age", "f8", (4,)),  # of the lag [s]
         ("pressed", "f8", (4,)),  # pressure as late as `growth`, motors as the pressure of their torque [Pa]
         ("slides", "u1", (4,)),  # it is cut
-        ("grip", "f8", (4,)),  # pressure that the road carried at the last slip [Pa]
+        ("grip", "f8", (4,)),  # pressure that the road carried at the last slip, at the present load [Pa]
+        ("load", "f8", (4,)),  # of the wheel in the last cycle [N]
         ("freed_s", "f8", (4,)),  # time at push-out pressure without spinning up
         ("steady_s", "f8", (4,)),  # time for which it has slipped less than `HALF` and steadily
+        ("follows", "u1", (4,)),  # it is capped for the other rear wheel's sake
         ("denied", "u1", (4,)),  # it did not spin up, or slips steadily: that is no wheel that locks
         ("let_go_s", "f8", (4,)),  # time until a wheel whose speed is not known has spun up
         ("acting", "u1"),  # on any wheel
@@ -89,16 +88,14 @@ LEAST_SPEED = 3.0  # m/s
 WHOLLY = 3.4  # 3 by the brush model, and what nominal friction and load may be off
 LEAST_SLIDING = 0.03  # slip that radii and noise hide
 AHEAD = 0.06  # s: dead time and lag of the hydraulics
-AGAIN = 5.0  # m/s^2, of a wheel that is capped already
+AGAIN, SURE = 5.0, 2.5  # m/s^2, of a wheel that is capped already; sigma of its growth taken off what comes
+COMES_BACK = 0.4  # of the slip to lose: below it a wheel that gains speed shows nothing of the road
+MOST_CHANGE = 0.1  # of a wheel's load in a cycle
 STANDS = 0.02  # of the ground's speed
 BACK_S, LEAST_BACK = 0.15, 6.0  # s, m/s^2
 STILL = 0.9  # of what the road carried is carried by a tyre that slips on, until the hydraulics follow
 RETURNED = (0.97, 0.97, 0.9, 0.9)  # of `grip`, which is low-passed: the peak is higher
 CLIMB, FASTER = 0.25, 7.0  # of `grip` /s, 1/s of what is beyond it
-ABOVE_LOW = 1.2
-SLIDING, BESIDE = 0.6, 0.9  # of what the road carries at most: a tyre that slides, and as the seen rear one
-CLIMBS = 1.3  # over `grip`, until a wheel slips anew
-EASED, EMPTIES_S = 0.5, 0.12  # of what a sliding tyre carries; dead time and lag of the hydraulics
 CUT = 400.0 * BAR  # Pa/s; back to a wheel whose sensor lies
 RETURN = 150.0 * BAR  # Pa/s
 
@@ -137,10 +134,16 @@ def _follow_lag(
 
 
 @kernel
+def _sigma(state: Record, i: int) -> float:
+    """Return the standard deviation of the growth of a lag by noise of the wheel's speed [m/s^2]."""
+    sigma: float = OF_GROWTH * state.noise[i] / (1e-9 * CYCLE_NS)
+    return sigma
+
+
+@kernel
 def _noise(state: Record, i: int) -> float:
     """Return how far noise alone takes the growth of a lag beyond `QUIET` [m/s^2]."""
-    noise: float = NOISE * OF_GROWTH * state.noise[i] / (1e-9 * CYCLE_NS)
-    return max(noise - QUIET, 0.0)
+    return max(NOISE * _sigma(state, i) - QUIET, 0.0)
 
 
 @kernel
@@ -180,91 +183,34 @@ def _cut(state: Record, i: int, carried: float, inertia: float, beyond: float, l
 def _remember(state: Record, i: int, carried: float, stands: bool) -> None:
     """Follow the pressure that the road carries while a wheel slips [Pa]; unknown of one that stands."""
     if not state.slides[i]:
-        state.slides[i], state.grip[i] = 1, 0.0 if stands else max(state.cap[i], state.pressed[i])
+        state.slides[i], state.follows[i] = 1, 0
+        state.grip[i] = 0.0 if stands else max(state.cap[i], state.pressed[i])
     if not stands:
         comes_back = state.growth[i] < 0.0
         state.grip[i] = max(state.grip[i], carried) if comes_back else min(state.grip[i], carried)
 
 
 @kernel
-def _give_back(state: Record, i: int, carried: float, watching: bool, dt: float) -> None:
-    """Raise the cap of a wheel that slips no more."""
-    if state.slides[i] or state.growth[i] < RETURNING:
+def _give_back(state: Record, i: int, carried: float, target: float, watching: bool, dt: float) -> None:
+    """Raise the cap of a wheel that slips no more; `target` [m/s]: lag from which it slides wholly."""
+    if state.slides[i] or (state.growth[i] < RETURNING and state.lag[i] > COMES_BACK * target):
         state.slides[i], state.grip[i] = 0, max(state.grip[i], carried)
         state.cap[i] = max(state.cap[i], RETURNED[i] * state.grip[i])
     rise = CLIMB * max(state.grip[i], BAR) + FASTER * max(state.cap[i] - state.grip[i], 0.0)
     if state.denied[i]:
         rise = CUT
-    elif not watching:
+    elif state.follows[i] or not watching:
         rise = RETURN
     state.cap[i] += rise * dt
 
 
 @kernel
-def _shows(state: Record, inputs: Record, i: int) -> bool:
-    """Return whether a wheel's slip shows what the road carries."""
-    shows: bool = state.capped[i] != 0 and state.denied[i] == 0 and usable(inputs, WHEEL_SPEED + i)
-    return shows
-
-
-@kernel
-def _force(params: Record, estimate: Record, i: int, pressure: float) -> float:
-    """Return the force along the road [N] of a pressure [Pa] at a wheel."""
-    mu = estimate.mu[i] if estimate.mu[i] > 0.0 else params.mu_nominal[i]
-    force: float = brake_gain(params, i) * mu * pressure / params.wheel_radius[i]
-    return force
-
-
-@kernel
-def _adhesion(params: Record, state: Record, estimate: Record, i: int) -> float:
-    """Return the adhesion that a wheel's slip shows, less its climb until it slips anew."""
-    known = state.grip[i] if state.slides[i] else max(state.grip[i], state.cap[i] / CLIMBS)
-    adhesion: float = _force(params, estimate, i, max(known, BAR)) / max(estimate.load[i], 1.0)
-    return adhesion
-
-
-@kernel
-def _hold_unseen(
-    params: Record, state: Record, inputs: Record, estimate: Record, speed: float, i: int, dt: float
-) -> None:
-    """Cap a rear wheel whose speed is not known by what the road carries; before, let it spin up."""
-    if usable(inputs, WHEEL_SPEED + i):
-        state.let_go_s[i] = 0.0
-        return
-    state.let_go_s[i] = max(state.let_go_s[i] - dt, 0.0)
-    ahead, across, beside = i - 2, 3 - i, 5 - i
-    known, share = 0.0, 0.0
-    if _shows(state, inputs, ahead):
-        known, share = _adhesion(params, state, estimate, ahead), SLIDING
-        if _shows(state, inputs, across) and usable(inputs, WHEEL_SPEED + beside):
-            known *= _adhesion(params, state, estimate, beside) / _adhesion(params, state, estimate, across)
-            share = BESIDE if _shows(state, inputs, beside) else 0.0
-    if share > 0.0:
-        carried = max(BAR, known * estimate.load[i] / _force(params, estimate, i, 1.0))
-        most = share / SLIDING * carried if state.capped[i] else carried
-        if state.pressed[i] > most and state.let_go_s[i] == 0.0:
-            mass = params.wheel_inertia[i] / params.wheel_radius[i] ** 2
-            gains = (1.0 - EASED) * SLIDING * _force(params, estimate, i, carried)
-            state.let_go_s[i] = EMPTIES_S + abs(speed) * mass / gains
-        state.capped[i], state.grip[i], state.cap[i] = 1, carried, share * carried
-    if state.let_go_s[i] > 0.0:
-        state.slides[i], state.cap[i] = 1, EASED * SLIDING * state.grip[i]
-
-
-@kernel
-def _select_low(state: Record, inputs: Record, sent: Record, wanted: Record) -> None:
-    """Cap a rear wheel by what the road carries at the other one; hold it while that slips."""
-    for i in range(2, 4):
-        low = 5 - i
-        if not _shows(state, inputs, low):
-            continue
-        most = ABOVE_LOW * max(state.cap[low], state.grip[low])
-        if state.slides[low]:
-            most = max(sent[i], state.pressed[i])
-        if most < wanted[i]:
-            if not state.capped[i]:
-                state.capped[i], state.grip[i], state.cap[i] = 1, most, most
-            state.cap[i] = min(state.cap[i], most)
+def _follow_load(state: Record, estimate: Record, other: bool, i: int) -> None:
+    """Scale what the road carries at a wheel, and its cap, by its load; `other`: another controller cuts."""
+    load = max(estimate.load[i], 1.0)
+    change = load / state.load[i] if state.capped[i] and state.load[i] > 0.0 else 1.0
+    change = min(max(change, 1.0 if other else 1.0 - MOST_CHANGE), 1.0 + MOST_CHANGE)
+    state.cap[i], state.grip[i], state.load[i] = change * state.cap[i], change * state.grip[i], load
 
 
 @kernel
@@ -302,6 +248,7 @@ def guard_slip(
     for i in range(4):
         ground = abs(corner_speed(params, estimate, speed, i)) if watching else 0.0
         _follow_lag(params, state, inputs, ground, braking, i, dt)
+        _follow_load(state, estimate, other, i)
         per_torque, radius = 1.0 / (brake_gain(params, i) * params.mu_nominal[i]), params.wheel_radius[i]
         presses = BAR * pressure[i] + per_torque * motor[i]
         late = lag_gain(dt, PRESSED_LAG) * (presses - state.pressed[i])
@@ -324,7 +271,9 @@ def guard_slip(
             state.capped[i], state.cap[i] = 1, sent[i]
         if state.capped[i]:
             beyond = lag + AHEAD * state.growth[i] - target
-            again = begins or state.slides[i] != 0 or state.growth[i] > AGAIN + _noise(state, i)
+            sure = lag + AHEAD * (state.growth[i] - SURE * _sigma(state, i)) > target
+            again = state.growth[i] > AGAIN + _noise(state, i) and sure
+            again = begins or state.slides[i] != 0 or again
             if watching and beyond > 0.0 and again and not state.denied[i]:
                 least = params.push_out_pressure[i]
                 stands = state.rolled[i] < STANDS * ground
@@ -332,17 +281,17 @@ def guard_slip(
                 if not other:
                     state.cap[i] = least if stands else _cut(state, i, carried, inertia, beyond, least)
             else:
-                _give_back(state, i, carried, watching, dt)
+                _give_back(state, i, carried, target, watching, dt)
                 if not state.cap[i] < wanted[i]:
                     state.capped[i] = 0
             if not torque[i] > 0.0:
                 state.capped[i] = 0
         if not state.capped[i]:
-            state.slides[i], state.grip[i] = 0, 0.0
+            state.slides[i], state.follows[i], state.grip[i] = 0, 0, 0.0
     if watching and not other:
         for i in range(2, 4):
-            _hold_unseen(params, state, inputs, estimate, speed, i, dt)
-        _select_low(state, inputs, sent, wanted)
+            hold_unseen(params, state, inputs, estimate, speed, i, dt)
+        select_low(state, inputs, sent, wanted)
     state.acting = 0
     for i in range(4):
         state.acting = max(state.acting, state.capped[i])
