@@ -43,6 +43,9 @@ def check(log: Path, map: Path, config: Path | None, out: Path | None = None) ->
     source, findings = announced(load_source(map)), Findings(log)
     if unused := check_map(map, source, log):
         raise UserError(unused, "", "map suggest proposes one")
+    if out is not None and source.columns is None:
+        remedy = "maps messages, which have no lag; write the drive to a signal file, or leave --out away"
+        raise UserError(str(map), "inputs", remedy)
     inputs = _feeds(map, source)
     params = new_params(load_config(config or resource("config/suv.toml")))
     collector = Collector()
@@ -75,7 +78,7 @@ def check(log: Path, map: Path, config: Path | None, out: Path | None = None) ->
         )
     if judged.checked and open_:
         print(f"not judged, for it is not mapped or the drive shows too little: {', '.join(open_)}")
-    if out is not None:
+    if out is not None and stated is not None:
         write_lags(map, stated, late, out)
     return 1 if wrong else 0
 

@@ -20,15 +20,12 @@ def lag_line(lag: Lag, stated: ColumnMap | None) -> str:
     return f"{lag.line}; lag = {total:.2f}"
 
 
-def write_lags(map: Path, stated: ColumnMap | None, lags: list[Lag], out: Path) -> None:
+def write_lags(map: Path, stated: ColumnMap, lags: list[Lag], out: Path) -> None:
     """Write a map of columns with `lags` beside those that it states to `out`; say what was written.
 
     Raises:
-        UserError: the map is of frames, an input is not on a line of its own, or `out` cannot be written.
+        UserError: an input is not on a line of its own, or `out` cannot be written.
     """
-    if stated is None:
-        remedy = "maps messages, which have no lag; write the drive to a signal file, or leave --out away"
-        raise UserError(str(map), "inputs", remedy)
     text = map.read_text("utf-8")
     for lag in lags:
         total = _total(lag, stated)
