@@ -46,6 +46,11 @@ def read(path: Path, interfaces: list[str] | None = None) -> tuple[RecordArray, 
     return np.concatenate(blocks), quality
 
 
+def identifier(message: can.Message) -> int:
+    """Return what keeps messages of one stamp apart: of those that are alike the second is left out."""
+    return message.arbitration_id
+
+
 @st.composite
 def messages(
     draw: st.DrawFn,

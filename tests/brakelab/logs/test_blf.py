@@ -14,11 +14,15 @@ from hypothesis import strategies as st
 from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE
 from ecu.errors import UserError
 
-from .conftest import assert_is, messages, read
+from .conftest import assert_is, identifier, messages, read
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
-@given(st.lists(messages(), min_size=1, max_size=30), st.sampled_from([100, 131072]), st.sampled_from([0, 6]))
+@given(
+    st.lists(messages(), min_size=1, max_size=30, unique_by=identifier),
+    st.sampled_from([100, 131072]),
+    st.sampled_from([0, 6]),
+)
 def test_reads_what_python_can_reads(
     tmp_path: Path, sent: list[can.Message], container: int, level: int
 ) -> None:
@@ -130,8 +134,8 @@ def test_other_objects_and_requests_to_send_are_skipped(tmp_path: Path) -> None:
 )
 def test_a_damaged_object_is_skipped_and_counted(tmp_path: Path, damaged: bytes, count: str) -> None:
     path = tmp_path / "drive.blf"
-    good = blf_object(1, MESSAGE)
-    path.write_bytes(blf(good, damaged, good, good))
+    good = [blf_object(1, MESSAGE, 1_500_000_000 + 1000 * k) for k in range(3)]
+    path.write_bytes(blf(good[0], damaged, *good[1:]))
     frames, quality = read(path)
     assert len(frames) == 3, count
     assert quality.damaged >= 1
@@ -141,7 +145,8 @@ def test_a_damaged_object_is_skipped_and_counted(tmp_path: Path, damaged: bytes,
 
 def test_objects_outside_of_containers(tmp_path: Path) -> None:
     path = tmp_path / "drive.blf"
-    path.write_bytes(blf(blf_object(1, MESSAGE)) + blf_object(1, MESSAGE) + blf_object(1, MESSAGE))
+    first, *others = (blf_object(1, MESSAGE, 1_500_000_000 + 1000 * k) for k in range(3))
+    path.write_bytes(blf(first) + b"".join(others))
     frames, quality = read(path)
     assert (len(frames), quality.damaged, quality.cut) == (3, 0, "")
 

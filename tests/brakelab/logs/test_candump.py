@@ -16,7 +16,7 @@ from brakelab.logs.log_quality import LogQuality
 from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE
 from ecu.errors import UserError
 
-from .conftest import assert_is, messages, read
+from .conftest import assert_is, identifier, messages, read
 
 STAMPS = st.integers(1, 2_000_000).map(lambda ms: ms / 1e3)
 CHANNELS = st.sampled_from(["can0", "vcan1", "a", "slcan0_very_long"])
@@ -24,7 +24,7 @@ GOOD = "(1600000000.000100) can0 123#0102\n"
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
-@given(st.lists(messages(stamps=STAMPS, channels=CHANNELS), min_size=1, max_size=30))
+@given(st.lists(messages(stamps=STAMPS, channels=CHANNELS), min_size=1, max_size=30, unique_by=identifier))
 def test_reads_what_python_can_reads(tmp_path: Path, sent: list[can.Message]) -> None:
     path = tmp_path / "drive.log"
     with CanutilsLogWriter(path) as writer:
@@ -113,7 +113,7 @@ def test_stamps_keep_their_nanoseconds_and_disorder_is_counted(tmp_path: Path) -
 
 def test_a_last_line_without_its_end_is_not_used(tmp_path: Path) -> None:
     path = tmp_path / "drive.log"
-    path.write_text(GOOD * 3 + GOOD.rstrip())
+    path.write_text("".join(GOOD.replace("0102", f"{k:04X}") for k in range(3)) + GOOD.rstrip())
     frames, quality = read(path)
     assert len(frames) == 3
     assert quality.cut.startswith("line 4: the last line is cut off")

@@ -125,8 +125,8 @@ def test_of_a_packed_text_all_is_read_up_to_the_damage(tmp_path: Path, tail: byt
 
 def test_a_line_of_many_megabytes_is_one_damaged_line(tmp_path: Path) -> None:
     path = tmp_path / "drive.log"
-    good = b"(1600000000.000100) can0 123#0102\n"
-    path.write_bytes(good * 10 + bytes(5_000_000) + b"\n" + good * 10)
+    good = [b"(1600000000.000100) can0 123#01%02d\n" % k for k in range(20)]
+    path.write_bytes(b"".join(good[:10]) + bytes(5_000_000) + b"\n" + b"".join(good[10:]))
     frames, quality = read(path)
     assert (len(frames), quality.damaged, quality.first_damaged) == (20, 1, "line 11")
 
@@ -200,6 +200,35 @@ def test_clocks_that_jump_are_mended_and_reported(
     expected = np.array(true if "clock_set" in reported else stamps, object)[kept]
     # A clock that was set goes on from the last frame of the same interface, 20 ms before.
     assert np.abs(frames["stamp_ns"] - expected).max() <= 40_000_000 * ("clock_set" in reported)
+
+
+TWICE: dict[str, Callable[[list[str]], list[str]]] = {
+    "each line behind itself": lambda lines: [line for line in lines for _ in range(2)],
+    "two loggers that write by blocks of 3 s": lambda lines: [
+        line for k in range(0, 400, 60) for line in 2 * lines[k : k + 60]
+    ],
+    "blocks that are not alike": lambda lines: [
+        *lines[:90], *lines[:130], *lines[90:200], *lines[130:400], *lines[200:400],
+    ],
+    "the log behind itself": lambda lines: 2 * lines,
+    "thrice": lambda lines: 3 * lines,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("way", TWICE)
+@pytest.mark.parametrize("block_frames", [1 << 14, 37])
+def test_frames_that_stand_twice_count_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: str, block_frames: int
+) -> None:
+    monkeypatch.setattr(text_log, "BLOCK_FRAMES", block_frames)
+    lines = [f"({1600000000 + k // 20}.{k % 20 * 5:02d}0000) can{k % 2} 123#{k:04X}\n" for k in range(400)]
+    path = tmp_path / "drive.log"
+    written = TWICE[way](lines)
+    path.write_text("".join(written))
+    frames, quality = read(path)
+    assert [256 * one[0] + one[1] for one in frames["data"].tolist()] == list(range(400))
+    unlike = {name: value for name, value in vars(quality).items() if value != vars(LogQuality())[name]}
+    assert unlike == {"frames": 400, "frames_twice": len(written) - 400}
 
 
 @pytest.mark.parametrize("block_frames", [1 << 14, 50])

@@ -14,7 +14,7 @@ from brakelab.logs.asc import date_ns
 from brakelab.logs.trc import days_ns
 from ecu.contract.records import FRAME_ERROR, FRAME_EXTENDED, FRAME_FD, FRAME_REMOTE, RecordArray
 
-from .conftest import FD_LENGTHS, assert_is, messages, read
+from .conftest import FD_LENGTHS, assert_is, identifier, messages, read
 
 
 def assert_same(frames: RecordArray, interfaces: list[str], expected: list[can.Message], first: int) -> None:
@@ -28,7 +28,7 @@ def assert_same(frames: RecordArray, interfaces: list[str], expected: list[can.M
 
 # A CAN FD frame without data cannot be distinguished from a remote frame in ASC.
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
-@given(st.lists(messages(fd_lengths=FD_LENGTHS[1:]), min_size=1, max_size=30))
+@given(st.lists(messages(fd_lengths=FD_LENGTHS[1:]), min_size=1, max_size=30, unique_by=identifier))
 def test_asc_is_what_python_can_reads(tmp_path: Path, sent: list[can.Message]) -> None:
     path = tmp_path / "drive.asc"
     with ASCWriter(path) as writer:
@@ -42,7 +42,12 @@ def test_asc_is_what_python_can_reads(tmp_path: Path, sent: list[can.Message]) -
 
 # python-can's TRC writer gives a small 29-bit identifier fewer than the format's eight digits.
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
-@given(st.lists(messages(fd_too=False, least_extended=0x10000000), min_size=1, max_size=30), st.booleans())
+@given(
+    st.lists(
+        messages(fd_too=False, least_extended=0x10000000), min_size=1, max_size=30, unique_by=identifier
+    ),
+    st.booleans(),
+)
 def test_trc_is_what_python_can_reads(tmp_path: Path, sent: list[can.Message], old: bool) -> None:
     path = tmp_path / "drive.trc"
     with TRCWriter(path) as writer:

@@ -2,8 +2,8 @@
 
 Readers hand over `FrameBlock`s. `checked` counts stamps that repeat or step back and gaps, leaves out the
 single frame whose stamp is far from its neighbours (a flipped bit), and lets time go on where the clock was
-set, back by more than a second or on by more than an hour. A log that is stored from its end is in memory as
-a whole.
+set, back by more than a second or on by more than an hour. Of frames that stand twice the second is left out.
+A log that is stored from its end is in memory as a whole.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.contract.records import RecordArray, new_record
+from brakelab.logs.frames_twice import FEW, KEPT, MEMORY, OUTLIER, TWICE, begins_anew, stands_before
+from ecu.contract.records import FRAME, RecordArray, new_record
 from ecu.errors import UserError
 from ecu.jit import Record, kernel
 
@@ -25,7 +26,6 @@ MAX_JUMP_NS: Final = 3_600_000_000_000
 # Assumption: no adapter holds a frame back for longer; an older stamp comes from a clock that was set.
 STEP_NS: Final = 1_000_000_000
 _FARTHEST_NS: Final = 1 << 61  # the year 2043: sums of two such stamps are still numbers
-_FEW: Final = 10  # frames, too few to judge their order
 _AHEAD: Final = 4096  # frames among which the next of the same interface is looked for
 
 _STAMPS: Final = np.dtype(
@@ -40,6 +40,9 @@ _STAMPS: Final = np.dtype(
         ("set", "i8"),
         ("set_ns", "i8"),  # by how much the clock was set first …
         ("set_at", "i8"),  # … and the index, if it is in this block
+        ("twice", "i8"),
+        ("again", "i8"),  # whether the log stands here a second time, up to …
+        ("until_ns", "i8"),
         ("jump", "i8"),  # index of the frame of an interface whose clock is another from the beginning
         ("known", "i8", (256,)),  # by interface, as the two that follow
         ("last_ns", "i8", (256,)),
@@ -109,6 +112,8 @@ class LogQuality(Damage):
     frames: int = 0
     stamps_backwards: int = 0
     """Against the frame before on the same interface."""
+    frames_twice: int = 0
+    """Frames that stand in the log a second time, and were left out."""
     gaps: int = 0
     """Times of more than a second without any frame."""
     longest_gap_s: float = 0.0
@@ -145,26 +150,48 @@ def _stamp(frames: RecordArray, i: int, state: Record) -> int:
 
 
 @kernel
-def _check(frames: RecordArray, kept: NDArray[np.bool_], state: Record, mended: bool, last: bool) -> int:
-    """Judge frames until one whose verdict takes those of the next block (`last`: there is none)."""
+def _check(
+    frames: RecordArray,
+    verdict: NDArray[np.uint8],
+    first: RecordArray,
+    before: RecordArray,
+    state: Record,
+    mended: bool,
+    last: bool,
+) -> int:
+    """Judge frames until one whose verdict takes those of the next block (`last`: there is none).
+
+    `first` are those of the log, `before` the last before these.
+    """
     state.longest_at = state.set_at = state.jump = -1
     for i in range(len(frames)):
         bus = frames[i].bus
         stamp = _stamp(frames, i, state)
-        before = state.last_ns[bus] if state.known[bus] else state.latest_ns
-        step = stamp - before
+        past = state.last_ns[bus] if state.known[bus] else state.latest_ns
+        step = stamp - past
+        if mended and step <= 0 and state.known[bus]:
+            if step < -STEP_NS and not state.again:
+                if i + FEW > len(frames) and not last:
+                    return i
+                if begins_anew(frames, i, first):
+                    state.again, state.until_ns = 1, state.latest_ns
+            again = state.again and stamp <= state.until_ns
+            if again or stands_before(frames, i, stamp, verdict, before):
+                state.twice += 1
+                verdict[i] = TWICE
+                continue
         if mended and state.started and abs(step) > STEP_NS:
             follower = _next_on(frames, i)
             if follower == -2 and not last:
                 return i
             alone = follower < 0
             goes_on = stamp if alone else _stamp(frames, follower, state)
-            if abs(goes_on - before) <= STEP_NS < abs(goes_on - stamp):
-                kept[i] = False
+            if abs(goes_on - past) <= STEP_NS < abs(goes_on - stamp):
+                verdict[i] = OUTLIER
                 continue
             if abs(step) > MAX_JUMP_NS:
                 if alone or abs(goes_on - stamp) > MAX_JUMP_NS:
-                    kept[i] = False
+                    verdict[i] = OUTLIER
                     continue
                 if not state.known[bus]:
                     state.jump = i
@@ -174,15 +201,17 @@ def _check(frames: RecordArray, kept: NDArray[np.bool_], state: Record, mended: 
                     state.set_at, state.set_ns = i, step
                 state.set += 1
                 state.shift_ns[bus] -= step
-                stamp = before
+                stamp = past
         if state.known[bus]:
-            state.backwards += step < 0 and stamp != before
+            state.backwards += step < 0 and stamp != past
             state.repeated += step == 0
         silent = stamp - state.latest_ns
         if state.started and silent > STEP_NS:
             state.gaps += 1
             if silent > state.longest_ns:
                 state.longest_ns, state.longest_at = silent, i
+        if stamp > state.until_ns:
+            state.again = 0
         state.latest_ns = max(stamp, state.latest_ns) if state.started else stamp
         state.last_ns[bus] = stamp
         state.known[bus] = state.started = 1
@@ -203,12 +232,13 @@ def checked(
     state = new_record(_STAMPS)
     stamps = state[0]
     rest: FrameBlock | None = None
+    first = before = np.empty(0, FRAME)
     for following in chain(blocks, [None]):
         block = _joined(rest, following)
         if block is None:
             return
-        kept = np.ones(len(block.frames), np.bool_)
-        judged = _check(block.frames, kept, stamps, mended, following is None)
+        verdict = np.zeros(len(block.frames), np.uint8)
+        judged = _check(block.frames, verdict, first, before, stamps, mended, following is None)
         if stamps["jump"] >= 0:
             raise UserError(
                 str(path),
@@ -221,13 +251,16 @@ def checked(
             quality.longest_gap = _place(block, stamps["longest_at"])
             quality.longest_gap_s = round(1e-9 * int(stamps["longest_ns"]), 6)
         rest = FrameBlock(block.frames[judged:], block.places[judged:], block.unit)
-        frames, kept = block.frames[:judged], kept[:judged]
-        outliers = np.flatnonzero(~kept)
+        frames, verdict = block.frames[:judged], verdict[:judged]
+        outliers = np.flatnonzero(verdict == OUTLIER)
         if len(outliers):
             quality.note_damage(len(outliers), _place(block, outliers[0]))
-            frames = frames[kept]
+        frames = frames[verdict == KEPT]
         quality.stamps_backwards = int(stamps["backwards"])
         quality.stamps_repeated = int(stamps["repeated"])
+        quality.frames_twice = int(stamps["twice"])
+        first = np.concatenate([first, frames[: FEW - len(first)]])
+        before = np.concatenate([before, frames])[-MEMORY:]
         quality.clock_set, quality.gaps = int(stamps["set"]), int(stamps["gaps"])
         quality.frames += len(frames)
         if _falls(frames, quality) and not quality.backwards:
@@ -242,7 +275,7 @@ def checked(
 
 def _falls(frames: RecordArray, quality: LogQuality) -> bool:
     """Return whether time falls from frame to frame in the first ones of a log."""
-    first = quality.frames == len(frames) > _FEW
+    first = quality.frames == len(frames) > FEW
     falls = first and 2 * quality.stamps_backwards > quality.frames
     return falls and bool(frames["stamp_ns"][-1] < frames["stamp_ns"][0])
 

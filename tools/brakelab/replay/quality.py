@@ -113,8 +113,9 @@ def damage_lines(findings: Findings) -> list[str]:
             lines.append(
                 f"{name}: {found.first_set}: the clock was set {often}; time goes on as before it{split}"
             )
-    if signals.rows_twice:
-        lines.append(f"{name}: {signals.rows_twice} rows stand twice; the second of each was left out")
+    for twice, what in ((signals.rows_twice, "rows"), (log.frames_twice, "frames")):
+        if twice:
+            lines.append(f"{name}: {twice} {what} stand twice; the second of each was left out")
     if log.stamps_backwards:
         lines.append(
             f"{name}: time steps back at {log.stamps_backwards} frames; they count in the order of the log"

@@ -21,6 +21,7 @@ _DAMAGE: Final = {
     "stamps_backwards": "steps back in time",
     "clock_set": "times the clock was set",
     "rows_twice": "rows twice",
+    "frames_twice": "frames twice",
     "gaps": "gaps of more than a second",
     "dropped": "frames dropped by the kernel",
 }
