@@ -43,6 +43,7 @@ TESTS = {
     ),
     "ecu/algorithm/control/mode.py": ("algorithm/control/test_mode.py",),
     "ecu/algorithm/control/slip_guard.py": ("algorithm/control/test_slip_guard.py",),
+    "ecu/algorithm/control/rear_guard.py": ("algorithm/control/test_slip_guard.py",),
     "ecu/bus/e2e.py": ("bus/test_e2e.py",),
     "ecu/bus/sequence.py": ("bus/test_sequence.py",),
     "ecu/bus/link.py": ("bus/test_link.py",),
