@@ -19,7 +19,6 @@ import numpy as np
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.algorithm.estimation.joint.drive import other_decel, torque_share
 from ecu.algorithm.estimation.joint.layout import BIAS, LEVEL, MASS, V
-from ecu.algorithm.estimation.joint.prior import forget_levels
 from ecu.algorithm.estimation.joint.wheel import (
     brake_torque,
     drive_opposes,
@@ -42,7 +41,6 @@ from ecu.algorithm.estimation.joint.whole_filter import (
     ceiling_of,
     correct_by_coasting,
     correct_by_mean,
-    forget_filter,
     per_power,
     published_ceiling,
     restore_filter,
@@ -150,9 +148,6 @@ def begin_whole(params: Record, state: Record, joint: Record) -> None:
     alone = not _windows_teach(params, state, joint)
     if state.alone and not alone:
         _hand_over_scale(state, joint)
-    if not state.alone and torque_share(state) != 1.0:  # windows took all of it for arriving
-        forget_levels(joint)
-        forget_filter(state.filter)
     state.alone = 1 if alone else 0
     state.bent, state.age_s, state.coasting_s, state.common = 0, 0.0, 0.0, joint.sampling.common
     _open_mean(state)

@@ -342,22 +342,6 @@ def test_windows_teach_nothing_by_torques_of_which_a_share_arrives(
     assert bool(bystander.state["alone"]) == alone
 
 
-def test_what_windows_learned_by_torques_that_do_not_arrive_is_forgotten_once(bystander: Bystander) -> None:
-    params, joint, state = bystander.params, bystander.joint, bystander.state
-    params["mapped"], params["sigma_motor_torque"] = 1, 0.0
-    joint["speed_copies"], joint["differs"], joint["motors"]["samples"] = -1, 1, 1
-    begin_whole(params, state, joint)
-    joint["x"][LEVEL : LEVEL + 4], state["filter"]["value"][OVERRUN] = 0.3, 0.02
-    state["filter"]["covariance"][SCALE, SCALE] = BESIDE**2
-    _drive(bystander, 0.4)
-    begin_whole(params, state, joint)
-    assert (joint["x"][LEVEL : LEVEL + 4] == 0.0).all()
-    assert state["filter"]["covariance"][SCALE, SCALE] == PRIOR[SCALE] ** 2
-    state["filter"]["value"][SCALE] = 0.1
-    begin_whole(params, state, joint)
-    assert state["filter"]["value"][SCALE] == 0.1
-
-
 def test_windows_teach_nothing_where_no_accelerometer_is_mapped(bystander: Bystander) -> None:
     """The change of speed that stands for it is what the wheels say already."""
     bystander.params["mapped"], bystander.params["sigma_motor_torque"] = 1, 0.0
