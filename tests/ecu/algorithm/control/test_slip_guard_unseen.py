@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from ecu.algorithm.control.slip_guard import BESIDE, EASED, EMPTIES_S, SLIDING, guard_slip
+from ecu.algorithm.control.rear_guard import BESIDE, EASED, EMPTIES_S, SLIDING
+from ecu.algorithm.control.slip_guard import guard_slip
 from ecu.algorithm.estimate import ESTIMATE
 from ecu.contract.signals import CORNERS, INPUT
 
