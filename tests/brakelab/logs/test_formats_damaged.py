@@ -215,15 +215,15 @@ TWICE: dict[str, Callable[[list[str]], list[str]]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("way", TWICE)
+@pytest.mark.parametrize("order", TWICE)
 @pytest.mark.parametrize("block_frames", [1 << 14, 37])
 def test_frames_that_stand_twice_count_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: str, block_frames: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, order: str, block_frames: int
 ) -> None:
     monkeypatch.setattr(text_log, "BLOCK_FRAMES", block_frames)
     lines = [f"({1600000000 + k // 20}.{k % 20 * 5:02d}0000) can{k % 2} 123#{k:04X}\n" for k in range(400)]
     path = tmp_path / "drive.log"
-    written = TWICE[way](lines)
+    written = TWICE[order](lines)
     path.write_text("".join(written))
     frames, quality = read(path)
     assert [256 * one[0] + one[1] for one in frames["data"].tolist()] == list(range(400))

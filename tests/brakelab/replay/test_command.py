@@ -191,7 +191,7 @@ def test_unknown_columns_are_named(tmp_path: Path, capsys: pytest.CaptureFixture
     assert f"{path}: columns not used: speed, gear\n" in capsys.readouterr().err
 
 
-FOREIGN = "(1600000000.000100) can0 7A1#0102030405060708\n" * 3
+FOREIGN = "".join(f"(1600000000.000{i}00) can0 7A1#0102030405060708\n" for i in range(3))
 REFUSED: dict[str, tuple[str, str | None, str]] = {
     "log of a foreign bus": ("drive.log", FOREIGN, "3 frames on can0: no identifier that is expected ("),
     "frames of ours without a right CRC": (

@@ -18,7 +18,7 @@ from brakelab.plant.friction.law import KELVIN, Law, Positive, RigBrake, linear_
 from brakelab.plant.jit import Record, kernel
 
 AREA: Final = 1
-HOTTEST: Final = 2
+MEASURED: Final = 2
 FIRST: Final = 3
 
 Three = tuple[float, float, float]
@@ -59,6 +59,6 @@ def step(
     """Return friction, twice, `dt` [s] later; see the package for the inputs."""
     p_1 = parameter(row, 1, pressure, speed)
     rate = -p_1 * (pressure * row[AREA] * speed + parameter(row, 2, pressure, speed))
-    drive = p_1 * parameter(row, 3, pressure, speed) * (min(temperature, row[HOTTEST]) + KELVIN)
+    drive = p_1 * parameter(row, 3, pressure, speed) * (min(temperature, row[MEASURED]) + KELVIN)
     mu = max(linear_step(memory, rate, drive, dt), 0.0)
     return mu, mu
