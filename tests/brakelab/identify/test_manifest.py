@@ -79,13 +79,13 @@ def test_a_file_of_columns_renames_a_manifest_s_own_columns(tmp_path: Path, thei
 def test_a_title_above_the_names_and_a_sum_below_the_rows_are_no_measurements(tmp_path: Path) -> None:
     (tmp_path / "manifest.csv").write_text(f"Pad wear, rig 3\n\n{OWN}Sum;;12,5\n")
     (tmp_path / "mine.toml").write_text(NAMED)
-    ((line, row),) = measured_rows(tmp_path / "manifest.csv", tmp_path / "mine.toml")
+    ((line, row),) = measured_rows(read_manifest(tmp_path / "manifest.csv", tmp_path / "mine.toml"))
     assert (line, row["block"], row["mass_before"]) == (4, "kühl", "905.123")
 
 
 def test_without_any_file_every_row_is_kept_to_be_refused(tmp_path: Path) -> None:
     (tmp_path / "manifest.csv").write_text("block,mass_before\nkühl,905.123\n")
-    assert len(measured_rows(tmp_path / "manifest.csv")) == 1
+    assert len(measured_rows(read_manifest(tmp_path / "manifest.csv"))) == 1
 
 
 @pytest.mark.parametrize(

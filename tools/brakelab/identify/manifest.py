@@ -79,12 +79,8 @@ def _lines(path: Path, text: bytes) -> list[tuple[int, list[str]]]:
     return [(table.line_num + skipped, row) for row in table]
 
 
-def measured_rows(path: Path, given: Path | None = None) -> list[tuple[int, dict[str, str]]]:
-    """Return the rows of a manifest that name a file, all where none does: sums and means do not.
-
-    Arguments and errors as of `read_manifest`.
-    """
-    rows = read_manifest(path, given)
+def measured_rows(rows: list[tuple[int, dict[str, str]]]) -> list[tuple[int, dict[str, str]]]:
+    """Return those of a manifest's rows that name a file, all where none does: sums and means do not."""
     return [row for row in rows if row[1].get("file")] or rows
 
 

@@ -59,8 +59,9 @@ def open_campaign(
         raise UserError("--axle", axle, "choose front or rear")
     vehicle = load_config(config)
     written = out, out.with_suffix(".md"), out.with_suffix(".svg")
-    rows = measured_rows(manifest, columns)
-    for line, row in read_manifest(manifest, columns):
+    stated = read_manifest(manifest, columns)
+    rows = measured_rows(stated)
+    for line, row in stated:
         if (line, row) not in rows:
             said = ", ".join(cell for cell in row.values() if cell)
             say(f"{manifest}: line {line} ({said}) names no file, so it is no measurement; left out")

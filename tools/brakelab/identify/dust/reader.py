@@ -28,7 +28,7 @@ from brakelab.identify.friction.check import numbers_of, refuse_units, say_unlik
 from brakelab.identify.friction.columns import Columns, load_columns
 from brakelab.identify.friction.reader import in_si
 from brakelab.identify.friction.recording import Recording
-from brakelab.identify.manifest import measured_rows, refuse_row
+from brakelab.identify.manifest import measured_rows, read_manifest, refuse_row
 from brakelab.identify.measurement_files import check_celsius, read_columns
 from brakelab.identify.units import COUNTED
 from brakelab.stretches import stretches
@@ -70,7 +70,7 @@ def read_trips(manifest: Path, config: Config, axle: str, given: Path | None = N
     """
     trips, numbers = [], []
     columns = trip_columns(config, axle, given)
-    for line, row in measured_rows(manifest, given):
+    for line, row in measured_rows(read_manifest(manifest, given)):
         if not row.get("trip") or not row.get("file") or row.get("test") not in ("0", "1"):
             raise refuse_row(manifest, line, row, "trip, file and test (1: held out, else 0)")
         path = manifest.parent / row["file"]

@@ -19,7 +19,7 @@ from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.reader import read_recording
 from brakelab.identify.friction.recording import Recording
 from brakelab.identify.friction.sequence import read_sequence
-from brakelab.identify.manifest import measured_rows, refuse_row
+from brakelab.identify.manifest import measured_rows, read_manifest, refuse_row
 from brakelab.identify.measurement_files import check_celsius, read_columns
 from brakelab.identify.samples import LONGEST_GAP, bridged
 from brakelab.identify.wear.reproduced import Reproduced, reproduced
@@ -63,7 +63,7 @@ def read_blocks(manifest: Path, config: Config, axle: str, columns: Path | None 
     Raises:
         UserError: a file, a row or a value of it is not right.
     """
-    rows = measured_rows(manifest, columns)
+    rows = measured_rows(read_manifest(manifest, columns))
     if not rows:
         raise UserError(str(manifest), "", "no blocks; give a row with block, file, mass_before, mass_after")
     read = [_block(manifest, line, row, config, axle, columns) for line, row in rows]
