@@ -138,14 +138,17 @@ def key_of(secret: bytes, seed: bytes) -> bytes:
 
 
 def give_seed(session: Session, ecu: Ecu, now_s: float) -> tuple[Session, bytes]:
-    """Return the seed, zeros where access is granted already. Raises Refused."""
+    """Return the seed, zeros where access is granted already. Raises Refused.
+
+    Asked for again before its key it is the same (ISO 14229-1): its first response may be late.
+    """
     if not ecu.secret:
         raise Refused(CONDITIONS_NOT_CORRECT)
     if now_s < session.delayed_until_s:
         raise Refused(DELAY_NOT_EXPIRED)
     if session.unlocked:
         return session, bytes(SEED_BYTES)
-    seed = ecu.new_seed()
+    seed = session.seed or ecu.new_seed()
     return session._replace(seed=seed), seed
 
 

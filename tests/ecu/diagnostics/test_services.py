@@ -71,6 +71,8 @@ EXCHANGES = {
     "seed": (LOCKED, "27 01", "67 01" + " 01" * 16, {}),
     "seed in the default session": ((), "27 01", "7F 27 7F", {}),
     "seed without a key file": (LOCKED, "27 01", "7F 27 22", NO_KEY),
+    "seed asked for twice": ((*LOCKED, "27 01"), "27 01", "67 01" + " 01" * 16, {}),
+    "after a wrong key": ((*LOCKED, "27 01", "27 02" + " 00" * 16), "27 01", "67 01" + " 02" * 16, {}),
     "seed when unlocked": (UNLOCKED, "27 01", "67 01" + " 00" * 16, {}),
     "right key": ((*LOCKED, "27 01"), "key", "67 02", {}),
     "wrong key": ((*LOCKED, "27 01"), "27 02" + " 00" * 16, "7F 27 35", {}),
