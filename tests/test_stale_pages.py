@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from stale_pages import ALSO, HEADER, LOOPS, OUTPUTS, TIMES, UNSEEN, code_of, judge, main
+from stale_pages import ALSO, HEADER, LOOPS, MARK, OUTPUTS, TIMES, UNSEEN, code_of, judge, main
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted((ROOT / "docs/results").glob("*.md"))
@@ -168,12 +168,26 @@ def test_times_are_measured_for_each_version(checkout: Path) -> None:
     assert judge(checkout, checkout / PAGE) == "brake.md: of version 1, this is 1.1"
 
 
-def test_a_check_fails_where_a_page_is_stale(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--check", str(checkout)]) == 0
+def test_a_check_fails_where_a_page_does_not_say_that_it_is_stale(
+    checkout: Path, tmp_path_factory: pytest.TempPathFactory, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before, check, mark = (checkout / PAGE).read_text(), ["--check", str(checkout)], ["--mark", str(checkout)]
+    assert main(check) == 0
     assert capsys.readouterr().out == "0 of 1 pages of docs/results are stale\n"
     _write(checkout, {"ecu/brake.py": "GAIN = 2.2\n"})
     assert main([str(checkout)]) == 0
-    assert main(["--check", str(checkout)]) == 1
+    assert main(check) == 1
+    assert main(mark) == main(mark) == main(check) == 0
+    assert (checkout / PAGE).read_text() == before.replace("0.\n", f"0.\n\n{MARK}\n", 1)
+    _write(checkout, {"ecu/brake.py": BRAKE})
+    assert main(check) == 1
+    assert main(mark) == 0
+    assert (checkout / PAGE).read_text() == before
+    _git(checkout, "commit", "-qam", "more", "--allow-empty")
+    shallow = tmp_path_factory.mktemp("shallow") / "clone"
+    _git(checkout, "clone", "-q", "--depth", "1", f"file://{checkout}", str(shallow))
+    _write(shallow, {PAGE: _page("abcdef0")})
+    assert main(["--check", str(shallow)]) == 0
 
 
 def test_the_runs_and_modules_that_it_names_are_there() -> None:

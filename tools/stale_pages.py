@@ -1,6 +1,6 @@
 """Check for pages of docs/results whose figures may have moved since they were measured.
 
-    python tools/stale_pages.py [--check] [CHECKOUT]
+    python tools/stale_pages.py [--mark | --check] [CHECKOUT]
 
 A page names the bench that wrote it and the commit it was measured on. It is stale where one of these
 changed since:
@@ -11,7 +11,9 @@ changed since:
   docstrings, comments, imports and a move to another folder change no figure.
 
 What golden runs give is the code's because `make test` and `make studies` hold it.
-A page of times is measured for each version. With `--check` the exit code is 1 where a page is stale.
+A page of times is measured for each version. `--mark` writes below the header of a stale page that it is
+stale, and takes it out elsewhere; with `--check` the exit code is 1 where a page says something else. A
+checkout without history checks nothing.
 """
 
 import ast
@@ -58,6 +60,7 @@ PRESENTATION = (
 """Modules that write the page down; none of the figures is theirs."""
 HEADER = re.compile(r"`brake-ecu bench ?(?P<bench>\w*)`, version (?P<version>\w+(\.\w+)*)")
 MEASURED = re.compile(r"^Measured on commit (?P<commit>\w+)(?P<dirty>-dirty)?,.*$", re.MULTILINE)
+MARK = "Stale: what these figures rest on has changed since; `python tools/stale_pages.py` says what."
 
 
 @cache
@@ -77,8 +80,9 @@ def _says_nothing(line: ast.stmt) -> bool:
     return text or page or isinstance(line, ast.Import | ast.ImportFrom)
 
 
-def _git(checkout: Path, *words: str) -> bytes:
-    return subprocess.run(["git", *words], cwd=checkout, capture_output=True, check=True).stdout
+def _git(checkout: Path, *words: str, stdin: str = "") -> bytes:
+    git = ["git", *words]
+    return subprocess.run(git, cwd=checkout, input=stdin.encode(), capture_output=True, check=True).stdout
 
 
 def _modules(checkout: Path) -> dict[str, Path]:
@@ -244,14 +248,40 @@ def version(checkout: Path) -> str:
     return str(tomllib.loads((checkout / "pyproject.toml").read_text("utf-8"))["project"]["version"])
 
 
+def marked(page: Path, stale: bool) -> str:
+    """Return the text of a page that says whether it is stale."""
+    text = page.read_text("utf-8").replace(f"\n{MARK}\n", "")
+    return MEASURED.sub(lambda line: f"{line[0]}\n\n{MARK}", text, count=1) if stale else text
+
+
+def has_history(checkout: Path, pages: list[Path]) -> bool:
+    """Return whether the checkout has the history of the pages: no copy of the last state alone."""
+    found = (MEASURED.search(page.read_text("utf-8")) for page in pages)
+    commits = "\n".join(f"{measured['commit']}^{{commit}}" for measured in found if measured)
+    try:
+        shallow = _git(checkout, "rev-parse", "--is-shallow-repository").strip() == b"true"
+        return not shallow and b" commit " in _git(checkout, "cat-file", "--batch-check", stdin=commits)
+    except (OSError, subprocess.CalledProcessError):
+        return False
+
+
 def main(arguments: list[str]) -> int:
-    """Print a line for each page that is stale. Returns 1 where there is one and `--check` is asked for."""
-    folders = [argument for argument in arguments if argument != "--check"]
+    """Print a line for each page that is stale, and write or check what the pages say of it."""
+    folders = [argument for argument in arguments if not argument.startswith("--")]
     checkout = Path(folders[0] if folders else Path(__file__).parent.parent).resolve()
     pages = sorted((checkout / "docs/results").glob("*.md"))
-    lines = [line for line in (judge(checkout, page) for page in pages) if line]
+    verdicts = {page: judge(checkout, page) for page in pages}
+    lines = [line for line in verdicts.values() if line]
     print(f"{len(lines)} of {len(pages)} pages of docs/results are stale", *lines, sep="\n  ")
-    return int(bool(lines) and "--check" in arguments)
+    wrong = [page for page in pages if marked(page, bool(verdicts[page])) != page.read_text("utf-8")]
+    if "--mark" in arguments:
+        for page in wrong:
+            page.write_text(marked(page, bool(verdicts[page])), "utf-8")
+    elif "--check" in arguments and wrong and has_history(checkout, pages):
+        names = ", ".join(page.name for page in wrong)
+        print(f"{names}: measure anew (make results), or python tools/stale_pages.py --mark")
+        return 1
+    return 0
 
 
 if __name__ == "__main__":
