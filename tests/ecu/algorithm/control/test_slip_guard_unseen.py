@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ecu.algorithm.control.rear_guard import BESIDE, EASED, EMPTIES_S, SLIDING
+from ecu.algorithm.control.rear_guard import BESIDE, EASED, EMPTIES_S, SLIDING, hold_unseen
 from ecu.algorithm.control.slip_guard import guard_slip
 from ecu.algorithm.estimate import ESTIMATE
 from ecu.contract.signals import CORNERS, INPUT
@@ -85,6 +85,74 @@ def test_a_wheel_that_presses_less_than_the_road_carries_is_not_eased(params, fe
     assert not guards["let_go_s"].any()
     first = guards[np.argmax(guards["capped"][:, 2])]
     assert first["cap"][2] == pytest.approx(share * first["grip"][2])
+
+
+# A front wheel: 63.6 bar at nominal friction use the whole of its load, a rear one: 171.4 bar.
+SHOWN = [
+    # case, front left: slides, grip, cap [bar]; mu there, at the rear left; what that is at the front
+    ("it slides", 1, 20.0, 30.0, 0.0, 0.0, 20.0),
+    ("it has climbed, not by more than 1.3", 0, 20.0, 22.0, 0.0, 0.0, 20.0),
+    ("it has climbed by half", 0, 20.0, 30.0, 0.0, 0.0, 30.0 / 1.3),
+    ("it has climbed to three times that", 0, 20.0, 60.0, 0.0, 0.0, 60.0 / 1.3),
+    ("all linings rough", 1, 20.0, 30.0, 0.6, 0.6, 20.0),
+    ("the rear lining twice as rough", 1, 20.0, 30.0, 0.3, 0.6, 10.0),
+    ("nothing left", 1, 0.0, 0.5, 0.0, 0.0, 1.0),
+]
+
+
+def held(params, feed, front: dict[int, tuple[int, float, float]], lost: tuple[int, ...], **rows):
+    """Return the guard after it has held the rear left wheel; `front`: slides, grip, cap [bar] of wheels."""
+    state, estimate, inputs = new_guard(), np.zeros(1, ESTIMATE)[0], feed()
+    estimate["load"] = params[0]["static_load"]
+    estimate["mu"] = rows.pop("mu", 0.0)
+    for i, (slides, grip, cap) in front.items():
+        state["capped"][i], state["slides"][i] = 1, slides
+        state["grip"][i], state["cap"][i] = grip * BAR, cap * BAR
+    for name, (i, value) in rows.items():
+        state[name][i] = value
+    for i in lost:
+        inputs[0]["verdict"][INPUT["wheel_speed_fl"] + i] = 0
+    hold_unseen(params[0], state, inputs[0], estimate, 20.0, 2, DT)
+    return state
+
+
+@pytest.mark.parametrize(
+    ("case", "slides", "grip", "cap", "mu", "rear", "carried"), SHOWN, ids=[row[0] for row in SHOWN]
+)
+def test_equal_adhesion_at_both_wheels_of_a_side(
+    params, feed, case, slides, grip, cap, mu, rear, carried
+) -> None:
+    state = held(params, feed, {0: (slides, grip, cap)}, (2,), mu=[mu, mu, rear, mu])
+    assert state["grip"][2] / BAR == pytest.approx(carried * 171.45 / 63.58, rel=1e-3), case
+    assert state["cap"][2] == pytest.approx(SLIDING * state["grip"][2])
+
+
+@pytest.mark.parametrize(
+    ("case", "lost", "rows", "capped"),
+    [
+        ("the wheel ahead shows it", (2,), {}, 1),
+        ("its speed is lost since it was capped", (0, 2), {}, 0),
+        ("its sensor lies", (2,), {"denied": (0, 1)}, 0),
+    ],
+)
+def test_which_wheel_ahead_shows_what_the_road_carries(params, feed, case, lost, rows, capped) -> None:
+    assert held(params, feed, {0: (1, 20.0, 20.0)}, lost, **rows)["capped"][2] == capped, case
+
+
+@pytest.mark.parametrize(
+    ("case", "capped", "pressed", "eased"),
+    [
+        ("it may stand: it had more than the road carries", 0, 1.2, True),
+        ("it had less", 0, 0.9, False),
+        ("it was given nine tenths of it: the hydraulics are as late", 1, 1.2, False),
+        ("it has more than that", 1, 1.6, True),
+    ],
+)
+def test_when_a_wheel_that_is_not_seen_is_eased(params, feed, case, capped, pressed, eased) -> None:
+    """An even road: both front wheels slip alike, the other rear one carries 40 bar."""
+    slips = {0: (1, 20.0, 20.0), 1: (1, 20.0, 20.0), 3: (1, 40.0, 40.0)}
+    rows = {"capped": (2, capped), "pressed": (2, pressed * 40.0 * BAR)}
+    assert bool(held(params, feed, slips, (2,), **rows)["let_go_s"][2]) == eased, case
 
 
 def test_a_speed_that_is_back_ends_that(params, feed) -> None:
