@@ -21,7 +21,7 @@ from ecu.algorithm.control.limiter import (
     reads_empty,
     watch_accumulator,
 )
-from ecu.algorithm.monitoring.witness import WITNESS_STATE
+from ecu.algorithm.monitoring.witness import WITNESS_STATE, begin_watch
 from ecu.contract.signals import ALIVE, INPUT, USABLE, VALID
 from ecu.jit import kernel
 from ecu.settings.config import load_config, new_params
@@ -217,6 +217,7 @@ ACCUMULATORS = [
     ("not yet", 40.0, 39.0, 60.0, 0.35, 0, 0),
     ("low, nothing more demanded", 40.0, 39.0, 45.0, 1.0, 0, 0),
     ("a calliper holds more", 11.0, 60.0, 60.0, 0.15, 0, 1),
+    ("by 12 bar", 40.0, 52.0, 60.0, 0.15, 0, 1),
     ("for a moment", 11.0, 60.0, 60.0, 0.05, 0, 0),
     ("not by more than both sensors err", 40.0, 47.0, 60.0, 0.45, 1, 0),
     ("lost", math.nan, 60.0, 60.0, 1.0, 0, 0),
@@ -239,14 +240,78 @@ def test_an_accumulator_limits_once_callipers_confirm_it(
     assert (state["confirmed"], state["denied"]) == (limits, denied), case
 
 
-def test_a_lost_calliper_pressure_denies_no_accumulator(feed) -> None:
+@pytest.mark.parametrize("corner", range(4))
+@pytest.mark.parametrize("lost", [False, True])
+def test_each_calliper_denies_an_accumulator_unless_it_is_lost(feed, corner, lost) -> None:
     inputs, state = feed(accumulator_pressure=11.0), np.zeros(1, LIMITER_STATE)[0]
-    feed(inputs, calliper_pressure=np.array([60.0, 0.0, 0.0, 0.0]))
-    inputs[0]["verdict"][INPUT["calliper_pressure_fl"]] = 0
+    feed(inputs, calliper_pressure=60.0 * (np.arange(4) == corner))
+    if lost:
+        inputs[0]["verdict"][INPUT["calliper_pressure_fl"] + corner] = 0
     state["asked"] = 60.0 * BAR
     for _ in range(100):
         watch_accumulator(state, WITNESS, inputs[0], DT)
-    assert (state["confirmed"], state["denied"]) == (1, 0)
+    assert (state["confirmed"], state["denied"]) == ((1, 0) if lost else (0, 1))
+
+
+BELIEFS = [
+    # case, accumulator reads, calliper, demand [bar], limits, denied before; limits, denied after a cycle
+    ("callipers hold less, as it says", 40.0, 30.0, 60.0, 0, 1, 0, 0),
+    ("nothing demanded: nothing is known", 40.0, 0.0, 0.0, 0, 1, 0, 1),
+    ("it holds far more than is demanded", 60.0, 30.0, 30.0, 0, 1, 0, 0),
+    ("hardly more", 33.0, 30.0, 30.0, 0, 1, 0, 1),
+    ("a calliper holds a little more", 35.0, 40.0, 60.0, 0, 1, 0, 1),
+    ("enough for the demand", 60.0, 30.0, 30.0, 1, 0, 0, 0),
+    ("not enough, by less than sensors err", 40.0, 39.0, 45.0, 1, 0, 1, 0),
+    ("not enough", 40.0, 39.0, 60.0, 1, 0, 1, 0),
+    ("denied", 40.0, 45.0, 60.0, 1, 1, 0, 1),
+]
+
+
+@pytest.mark.parametrize(
+    ("case", "reads", "calliper", "asked", "limits", "denied", "limits_then", "denied_then"),
+    BELIEFS,
+    ids=[row[0] for row in BELIEFS],
+)
+def test_how_long_an_accumulator_limits_or_is_denied(
+    feed, case, reads, calliper, asked, limits, denied, limits_then, denied_then
+) -> None:
+    inputs, state = feed(accumulator_pressure=reads), np.zeros(1, LIMITER_STATE)[0]
+    feed(inputs, calliper_pressure=np.array([calliper, 0.0, 0.0, 0.0]))
+    state["asked"], state["confirmed"], state["denied"] = asked * BAR, limits, denied
+    watch_accumulator(state, WITNESS, inputs[0], DT)
+    assert (state["confirmed"], state["denied"]) == (limits_then, denied_then), case
+
+
+def test_a_lost_accumulator_is_neither_confirmed_nor_denied(feed) -> None:
+    inputs, state = feed(accumulator_pressure=40.0), np.zeros(1, LIMITER_STATE)[0]
+    inputs[0]["verdict"][INPUT["accumulator_pressure"]] = 0
+    names = ("confirmed", "denied", "short_s", "above_s")
+    state["asked"], state["confirmed"], state["short_s"], state["above_s"] = 60.0 * BAR, 1, 0.3, 0.05
+    watch_accumulator(state, WITNESS, inputs[0], DT)
+    assert [float(state[name]) for name in names] == [0.0] * 4
+
+
+@pytest.mark.parametrize(
+    ("case", "reads", "calliper", "denied", "innovation", "left_out"),
+    [
+        ("a calliper holds more", 40.0, 60.0, 0, -20.0, 0),
+        ("denied", 40.0, 60.0, 1, -20.0, 1),
+        ("holds enough", 150.0, 60.0, 0, 0.0, 0),
+        ("empty", 5.0, 0.0, 0, 0.0, 1),
+    ],
+)
+def test_what_is_published_of_an_accumulator(
+    feed, case, reads, calliper, denied, innovation, left_out
+) -> None:
+    """Only that a calliper holds more speaks against it: by 8 bar it is beyond three sigma."""
+    inputs, state = feed(accumulator_pressure=reads), np.zeros(1, LIMITER_STATE)[0]
+    witness, place = np.zeros(1, WITNESS_STATE)[0], INPUT["accumulator_pressure"]
+    feed(inputs, calliper_pressure=np.array([calliper, 0.0, 0.0, 0.0]))
+    state["asked"], state["denied"] = 60.0 * BAR, denied
+    begin_watch(witness, DT)
+    watch_accumulator(state, witness, inputs[0], DT)
+    published = [float(witness["published"][name][place]) for name in ("innovation", "sigma", "rejected")]
+    assert published == pytest.approx([innovation, 8.0 / 3.0, left_out]), case
 
 
 def test_an_accumulator_that_agrees_again_is_believed_again(feed) -> None:
