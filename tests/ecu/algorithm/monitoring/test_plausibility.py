@@ -12,7 +12,7 @@ from ecu.algorithm.monitoring.plausibility import (
     watch_wheels,
     wheel_speed_implausible,
 )
-from ecu.algorithm.monitoring.witness import WITNESS_STATE
+from ecu.algorithm.monitoring.witness import WITNESS_STATE, begin_watch
 from ecu.contract.signals import ACCELERATOR_POSITION, CALLIPER_PRESSURE, MOTOR_TORQUE, WHEEL_SPEED
 
 WITNESS = np.zeros(1, WITNESS_STATE)[0]  # what is published does not matter here
@@ -375,3 +375,109 @@ def test_a_wheel_that_is_far_noisier_than_configured_is_left_out(
         feed(inputs, wheel_speed=omega, motor_torque=0.0, calliper_pressure=0.0)
         watch_wheels(params[0], state, witness, inputs[0], estimated(20.0, 0.0), 0.01)
     assert (witness["rejected"][WHEEL_SPEED : WHEEL_SPEED + 4] == left_out).all()
+
+
+def published(witness) -> dict[int, tuple[float, float]]:
+    """Return innovation and sigma [rad/s] of the wheels of which something was published in this cycle."""
+    row = witness["published"]
+    compared = [i for i in range(4) if row["judged_s"][WHEEL_SPEED + i] == 0.0]
+    return {i: (row["innovation"][WHEEL_SPEED + i], row["sigma"][WHEEL_SPEED + i]) for i in compared}
+
+
+FAST = [
+    # case, wheels over ground from the fast one on, lost, speed [m/s], brake torque [N m], excess published
+    ("beside wheels that roll", (1.03, 1.0, 1.0, 1.0), (), 20.0, 800.0, 0.03),
+    ("beside wheels that slip: over the ground", (1.03, 0.9, 0.9, 0.9), (), 20.0, 800.0, 0.03),
+    ("beside wheels faster than the ground", (1.08, 1.01, 1.02, 1.03), (), 20.0, 800.0, 1.08 / 1.02 - 1.0),
+    ("beside one that is left", (1.06, 1.02, 1.3, 1.3), (2, 3), 20.0, 800.0, 1.06 / 1.02 - 1.0),
+    ("beside none", (1.06, 1.02, 1.02, 1.02), (1, 2, 3), 20.0, 800.0, None),
+    ("lost itself", (1.06, 0.9, 0.9, 0.9), (0,), 20.0, 800.0, None),
+    ("as fast as the others", (1.01, 1.01, 1.01, 1.01), (), 20.0, 800.0, None),
+    ("slower", (0.97, 0.9, 0.9, 0.9), (), 20.0, 800.0, None),
+    ("too slow to tell", (1.03, 0.9, 0.9, 0.9), (), 3.0, 800.0, None),
+    ("not braked", (1.03, 0.9, 0.9, 0.9), (), 20.0, 50.0, None),
+]
+
+
+@pytest.mark.parametrize("fast", range(4))
+@pytest.mark.parametrize(
+    ("case", "turns", "lost", "speed", "torque", "excess"), FAST, ids=[row[0] for row in FAST]
+)
+def test_what_is_published_of_a_fast_wheel(
+    params, feed, fast, case, turns, lost, speed, torque, excess
+) -> None:
+    """Excess over the ground and over the mean of the others, in rad/s; 5 % are three sigma."""
+    state, witness = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, WITNESS_STATE)[0]
+    free = speed / params[0]["wheel_radius"]
+    inputs = feed(wheel_speed=free * np.roll(turns, fast))
+    for other in lost:
+        inputs[0]["verdict"][WHEEL_SPEED + (fast + other) % 4] = 0
+    begin_watch(witness, 0.01)
+    with np.errstate(divide="raise", invalid="raise"):
+        wheel_speed_implausible(params[0], state, witness, inputs[0], estimated(speed, torque), 0.01)
+    found = published(witness)
+    if excess is None:
+        assert fast not in found, case
+    else:
+        assert found[fast] == pytest.approx((excess * free[fast], 0.05 * free[fast] / 3.0)), case
+
+
+@pytest.mark.parametrize("corner", range(4))
+def test_what_is_published_of_a_wheel_that_falls(params, feed, corner) -> None:
+    """No brake makes it fall: 5 rad/s are three sigma."""
+    witness, state = np.zeros(1, WITNESS_STATE)[0], np.zeros(1, PLAUSIBILITY_STATE)[0]
+    state["omega"], omega = 60.0, np.full(4, 60.0)
+    omega[corner] = 57.0
+    begin_watch(witness, 0.01)
+    speed = 60.0 * float(params[0]["wheel_radius"][0])
+    watch_wheels(params[0], state, witness, feed(wheel_speed=omega)[0], estimated(speed, 0.0), 0.01)
+    assert published(witness) == {corner: pytest.approx((-3.0, 5.0 / 3.0))}
+
+
+@pytest.mark.parametrize("late", [None, 0, 1, 2, 3])
+def test_what_all_wheels_do_is_no_noise(params, feed, late) -> None:
+    """What the middle two do on average is the car's; compared where all four samples have come."""
+    state = np.zeros(1, PLAUSIBILITY_STATE)[0]
+    state["omega"] = 60.0
+    inputs = feed(wheel_speed=[59.0, 58.0, 56.0, 52.0])
+    if late is not None:
+        inputs[0]["new"][WHEEL_SPEED + late] = 0
+    watch_wheels(params[0], state, WITNESS, inputs[0], estimated(20.0, 800.0), 0.01)
+    assert state["change"] == pytest.approx([2.0, 1.0, -1.0, -5.0] if late is None else np.zeros(4))
+
+
+def test_a_single_jump_counts_as_thirty_sigma(params, feed) -> None:
+    """Low-passed with 0.5 s: that is no noise of six."""
+    state = np.zeros(1, PLAUSIBILITY_STATE)[0]
+    state["omega"] = 60.0
+    inputs = feed(wheel_speed=[120.0, 60.0, 60.0, 60.0])
+    watch_wheels(params[0], state, WITNESS, inputs[0], estimated(20.0, 0.0), 0.01)
+    expected = (1.0 - np.exp(-0.01 / 0.5)) * 30.0 * params[0]["sigma_wheel_speed"]
+    assert state["jitter"] == pytest.approx([expected, 0.0, 0.0, 0.0])
+
+
+NOISES = [
+    # case, noisy and rejected before, sigmas of noise; noisy then, published
+    ("quiet", 0, 0, 1.0, 0, False),
+    ("noisy from now on", 0, 0, 7.0, 1, True),
+    ("was noisy, not for long enough", 1, 0, 1.0, 0, True),
+    ("left out, until it has been quiet for a second", 1, 1, 1.0, 1, True),
+]
+
+
+@pytest.mark.parametrize("corner", range(4))
+@pytest.mark.parametrize(
+    ("case", "noisy", "rejected", "sigmas", "noisy_then", "judged"), NOISES, ids=[row[0] for row in NOISES]
+)
+def test_which_wheel_is_judged_by_its_noise(
+    params, feed, corner, case, noisy, rejected, sigmas, noisy_then, judged
+) -> None:
+    state, witness = np.zeros(1, PLAUSIBILITY_STATE)[0], np.zeros(1, WITNESS_STATE)[0]
+    state["noisy"][corner], witness["rejected"][WHEEL_SPEED + corner] = noisy, rejected
+    state["jitter"][corner] = sigmas * params[0]["sigma_wheel_speed"]
+    inputs = feed()
+    inputs[0]["new"][WHEEL_SPEED : WHEEL_SPEED + 4] = 0
+    begin_watch(witness, 0.01)
+    watch_wheels(params[0], state, witness, inputs[0], estimated(20.0, 0.0), 0.01)
+    assert state["noisy"].tolist() == [noisy_then * (i == corner) for i in range(4)], case
+    assert (corner in published(witness)) == judged
