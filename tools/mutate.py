@@ -36,14 +36,20 @@ from hypothesis import Phase, settings
 CHECKOUT = Path(__file__).parent.parent
 ARGUED = CHECKOUT / "tools" / "mutants.toml"
 
+SLIP_GUARD = (
+    "algorithm/control/test_slip_guard_cycle.py",
+    "algorithm/control/test_slip_guard.py",
+    "algorithm/control/test_slip_guard_unseen.py",
+)
 TESTS = {
     "ecu/algorithm/control/limiter.py": (
         "algorithm/control/test_limiter.py",
         "algorithm/control/test_limiter_left_right.py",
     ),
     "ecu/algorithm/control/mode.py": ("algorithm/control/test_mode.py",),
-    "ecu/algorithm/control/slip_guard.py": ("algorithm/control/test_slip_guard.py",),
-    "ecu/algorithm/control/rear_guard.py": ("algorithm/control/test_slip_guard.py",),
+    "ecu/algorithm/control/slip_guard.py": SLIP_GUARD,
+    "ecu/algorithm/control/rear_guard.py": SLIP_GUARD,
+    "ecu/algorithm/control/distribution.py": ("algorithm/control/test_distribution.py",),
     "ecu/bus/e2e.py": ("bus/test_e2e.py",),
     "ecu/bus/sequence.py": ("bus/test_sequence.py",),
     "ecu/bus/link.py": ("bus/test_link.py",),
