@@ -8,8 +8,8 @@ import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool, Range1d
 
 from brakelab.report.downsample import buckets, extremes, times
-from brakelab.report.look import LEFT, QUIET, RIGHT, draw_line, link_crosshair, new_figure
-from brakelab.report.over_time import POINTS, TIME
+from brakelab.report.look import LEFT, QUIET, RIGHT, TIME, draw_line, link_crosshair, new_figure
+from brakelab.report.over_time import POINTS
 from brakelab.report.page import Tile, fill, fixed, percent, signed_percent
 from brakelab.report.per_braking import Series, points_by_braking
 from brakelab.results.compare import Comparison, Judged, Part, cells

@@ -5,7 +5,7 @@ Left and right, estimated and demanded come from the palette of Okabe and Ito (2
 
 from typing import Any, Final
 
-from bokeh.models import SingleIntervalTicker
+from bokeh.models import Range1d, SingleIntervalTicker
 from bokeh.models.annotations import Legend, Span
 from bokeh.models.tools import CrosshairTool
 from bokeh.plotting import figure
@@ -45,6 +45,7 @@ DARK: Final = {
     STAGE_COLOURS[4]: "#a3acb9",
 }
 
+TIME: Final = "Time [s]"
 TOOLS: Final = "xpan,xbox_zoom,box_zoom,xwheel_zoom,undo,reset,save"
 
 
@@ -93,6 +94,13 @@ def free_figure(x_label: str, y_label: str, height: int = 300, **options: Any) -
     """Return an empty figure of no other's range: it is moved and zoomed along both axes."""
     tools = "pan,box_zoom,reset,save"
     return new_figure(x_label, y_label, height, tools=tools, active_drag="box_zoom", **options)
+
+
+def time_figure(label: str, span: Range1d, least_span: float) -> Any:
+    """Return an empty figure over the time of a drive, `span`; its own axis spans `least_span` at least."""
+    plot = new_figure(TIME, label, x_range=span, window_axis="x")
+    plot.y_range.min_interval = least_span
+    return plot
 
 
 def style_axis(axis: Any) -> Any:

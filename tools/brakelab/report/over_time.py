@@ -20,7 +20,7 @@ from brakelab.report.look import (
     SHADE,
     draw_line,
     link_crosshair,
-    new_figure,
+    time_figure,
 )
 from brakelab.report.modes import modes_plot
 from brakelab.report.wheels import plots_of_wheels
@@ -29,7 +29,6 @@ from brakelab.report.wheels import plots_of_wheels
 POINTS = 6000
 
 KMH = 3.6
-TIME = "Time [s]"
 _FRONT, _REAR = ("fl", "fr"), ("rl", "rr")
 
 
@@ -55,7 +54,7 @@ def plots_over_time(drive: DriveResult, truth: DriveResult | None, found: list[B
     source = ColumnDataSource(drawn(grid, drive.t, _lines(drive, truth)))
     span = Range1d(start=float(drive.t[0]), end=float(drive.t[-1]), name="drive-time", bounds="auto")
     plots = {
-        "speed": _speed(source, span),
+        "speed": _beside_truth(source, span, "Speed [km/h]", _LEAST_KMH, "speed", "0.0"),
         "deceleration": _deceleration(source, span),
         "friction-front": _estimate(source, span, "Friction front [-]", _FRONT, _FRICTION),
         "friction-rear": _estimate(source, span, "Friction rear [-]", _REAR, _FRICTION),
@@ -64,7 +63,7 @@ def plots_over_time(drive: DriveResult, truth: DriveResult | None, found: list[B
         "disc-front": _estimate(source, span, "Disc front [°C]", _FRONT, _DISC),
         "disc-rear": _estimate(source, span, "Disc rear [°C]", _REAR, _DISC),
         **plots_of_wheels(drive, truth, _coarse(_coarse(grid)), span),
-        "k-f": _tyre_factor(source, span),
+        "k-f": _beside_truth(source, span, "Tyre factor K_f [-]", _LEAST_FACTOR, "k_f", "0.000"),
         "modes": modes_plot(drive, _coarse(grid), span),
     }
     plots = {name: plot for name, plot in plots.items() if plot.renderers}
@@ -117,18 +116,19 @@ def _hover(plot: Any, source: ColumnDataSource, rows: list[tuple[str, str, str]]
         )
 
 
-def _speed(source: ColumnDataSource, span: Range1d) -> Any:
-    plot = new_figure(TIME, "Speed [km/h]", x_range=span, window_axis="x")
-    plot.y_range.min_interval = _LEAST_KMH
-    draw_line(plot, source, "speed", "estimated", ESTIMATE)
-    draw_line(plot, source, "speed_true", "true", INK, line_dash="dashed", line_width=1.2)
-    _hover(plot, source, [("estimated", "speed", "0.0"), ("true", "speed_true", "0.0")])
+def _beside_truth(
+    source: ColumnDataSource, span: Range1d, label: str, least_span: float, name: str, digits: str
+) -> Any:
+    """Return the figure of a quantity of the car as estimated, and true where that is known."""
+    plot = time_figure(label, span, least_span)
+    draw_line(plot, source, name, "estimated", ESTIMATE)
+    draw_line(plot, source, f"{name}_true", "true", INK, line_dash="dashed", line_width=1.2)
+    _hover(plot, source, [("estimated", name, digits), ("true", f"{name}_true", digits)])
     return plot
 
 
 def _deceleration(source: ColumnDataSource, span: Range1d) -> Any:
-    plot = new_figure(TIME, "Deceleration [m/s²]", x_range=span, window_axis="x")
-    plot.y_range.min_interval = _LEAST_DECELERATION
+    plot = time_figure("Deceleration [m/s²]", span, _LEAST_DECELERATION)
     draw_line(plot, source, "achieved", "achieved (measured)", ESTIMATE, line_width=1.0)
     draw_line(plot, source, "achieved_true", "achieved (true)", INK, line_dash="dashed", line_width=1.2)
     draw_line(plot, source, "grip_limit", "ceiling of grip", INK, line_dash="dotted", line_width=1.2)
@@ -142,7 +142,7 @@ def _deceleration(source: ColumnDataSource, span: Range1d) -> Any:
 def _estimate(
     source: ColumnDataSource, span: Range1d, label: str, corners: tuple[str, str], what: _Estimated
 ) -> Any:
-    plot = new_figure(TIME, label, x_range=span, window_axis="x")
+    plot = time_figure(label, span, what.least_span)
     sides = list(zip(corners, ("left", "right"), (LEFT, RIGHT), strict=True))
     name = what.column
     for corner, _, colour in sides:
@@ -156,7 +156,7 @@ def _estimate(
         dash = "dashed" if side == "left" else "dotted"
         draw_line(plot, source, f"{name}_true_{corner}", f"{side}, true", INK, line_dash=dash, line_width=1.3)
     # The lines set the range: a band that is briefly wide would compress everything.
-    plot.y_range.update(renderers=plot.renderers[bands:], range_padding=0.5, min_interval=what.least_span)
+    plot.y_range.update(renderers=plot.renderers[bands:], range_padding=0.5)
     rows = [
         (f"{side}{kind.replace('_', ' ')}", f"{name}{kind}_{corner}", what.digits)
         for corner, side, _ in sides
@@ -167,8 +167,7 @@ def _estimate(
 
 
 def _pressure(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple[str, str]) -> Any:
-    plot = new_figure(TIME, f"Pressure {axle} [bar]", x_range=span, window_axis="x")
-    plot.y_range.min_interval = _LEAST_BAR
+    plot = time_figure(f"Pressure {axle} [bar]", span, _LEAST_BAR)
     sides = list(zip(corners, ("left", "right"), (LEFT, RIGHT), strict=True))
     for corner, side, colour in sides:
         draw_line(plot, source, f"pressure_{corner}", side, colour, line_width=0.8, line_alpha=0.55)
@@ -182,13 +181,4 @@ def _pressure(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple
         (f"{side} {kind}", f"{name}_{corner}", "0.0") for corner, side, _ in sides for kind, name in kinds
     ]
     _hover(plot, source, rows)
-    return plot
-
-
-def _tyre_factor(source: ColumnDataSource, span: Range1d) -> Any:
-    plot = new_figure(TIME, "Tyre factor K_f [-]", x_range=span, window_axis="x")
-    plot.y_range.min_interval = _LEAST_FACTOR
-    draw_line(plot, source, "k_f", "estimated", ESTIMATE)
-    draw_line(plot, source, "k_f_true", "true", INK, line_dash="dashed", line_width=1.2)
-    _hover(plot, source, [("estimated", "k_f", "0.000"), ("true", "k_f_true", "0.000")])
     return plot

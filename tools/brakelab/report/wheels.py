@@ -18,11 +18,10 @@ from brakelab.report.look import (
     RIGHT,
     STAGE_COLOURS,
     draw_line,
-    new_figure,
+    time_figure,
 )
 from ecu.contract.signals import CORNERS
 
-TIME: Final = "Time [s]"
 LEAST_TORQUE: Final = 100.0
 """N m of brakes and motors together, below which a share is noise."""
 ROLLS: Final = 10.0  # rad/s
@@ -125,8 +124,7 @@ def road_speed(turned: Vector, by_slip: Vector) -> Vector:
 
 
 def _slip(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple[str, str]) -> Any:
-    plot = new_figure(TIME, f"Slip {axle} [%]", x_range=span, window_axis="x")
-    plot.y_range.min_interval = _LEAST_SLIP
+    plot = time_figure(f"Slip {axle} [%]", span, _LEAST_SLIP)
     for corner, (side, colour, _) in zip(corners, _SIDES, strict=True):
         draw_line(plot, source, f"slip_{corner}", side, colour, line_width=1.4)
     for corner, (side, _, dash) in zip(corners, _SIDES, strict=True):
@@ -135,8 +133,7 @@ def _slip(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple[str
 
 
 def _speeds(source: ColumnDataSource, span: Range1d) -> Any:
-    plot = new_figure(TIME, "Wheels [km/h]", x_range=span, window_axis="x")
-    plot.y_range.min_interval = _LEAST_KMH
+    plot = time_figure("Wheels [km/h]", span, _LEAST_KMH)
     if not any(f"speed_{corner}" in source.column_names for corner in _WHEELS):
         return plot
     draw_line(plot, source, "speed", "car", QUIET, line_width=3.0, line_alpha=0.5)
@@ -152,8 +149,7 @@ def _few(
     least_span: float,
     lines: tuple[tuple[str, str, str], ...],
 ) -> Any:
-    plot = new_figure(TIME, label, x_range=span, window_axis="x")
-    plot.y_range.min_interval = least_span
+    plot = time_figure(label, span, least_span)
     if label.endswith("[%]"):
         plot.y_range.start = 0.0
     for name, of, colour in lines:
