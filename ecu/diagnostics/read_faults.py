@@ -4,7 +4,7 @@ from typing import Final
 
 from ecu.diagnostics.fault_memory import AVAILABLE, FaultMemory
 from ecu.diagnostics.identifiers import OF_SNAPSHOT
-from ecu.diagnostics.session import INCORRECT_LENGTH, OUT_OF_RANGE, Refused
+from ecu.diagnostics.session import Reason, Refused
 from ecu.diagnostics.trouble_codes import FORMAT
 
 NUMBER_BY_MASK: Final = 0x01
@@ -32,7 +32,7 @@ def report(memory: FaultMemory, request: bytes) -> bytes:
     """
     kind = request[1] & 0x7F
     if len(request) != LENGTHS[kind]:
-        raise Refused(INCORRECT_LENGTH)
+        raise Refused(Reason.INCORRECT_LENGTH)
     if kind == NUMBER_BY_MASK:
         count = len(_matching(memory, request[2]))
         return bytes([AVAILABLE, FORMAT]) + count.to_bytes(2, "big")
@@ -43,7 +43,7 @@ def report(memory: FaultMemory, request: bytes) -> bytes:
     number, record = int.from_bytes(request[2:5], "big"), request[5]
     known = (FIRST, LAST) if kind == SNAPSHOT else (OCCURRENCES, AGEING)
     if number not in memory.entries or record not in (*known, ALL):
-        raise Refused(OUT_OF_RANGE)
+        raise Refused(Reason.OUT_OF_RANGE)
     entry = memory.entries[number]
     text = request[2:5] + bytes([entry.status & AVAILABLE])
     for one in known if record == ALL else [record]:

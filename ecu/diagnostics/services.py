@@ -15,24 +15,14 @@ from ecu.contract.work import Kind
 from ecu.diagnostics import read_faults
 from ecu.diagnostics.identifiers import PAD_THICKNESS, SESSION, length_of, to_values
 from ecu.diagnostics.session import (
-    ACCESS_DENIED,
-    CONDITIONS_NOT_CORRECT,
     DEFAULT,
     EXTENDED,
-    INCORRECT_LENGTH,
     KEY_BYTES,
-    OUT_OF_RANGE,
     P2_MS,
     P2_STAR_MS,
-    PENDING,
-    PROGRAMMING_FAILURE,
-    RESPONSE_TOO_LONG,
-    SEQUENCE_ERROR,
-    SERVICE_NOT_IN_SESSION,
-    SERVICE_NOT_SUPPORTED,
     SILENT_WHEN_FUNCTIONAL,
-    SUBFUNCTION_NOT_SUPPORTED,
     Ecu,
+    Reason,
     Refused,
     Session,
     begin,
@@ -90,7 +80,7 @@ class Service(NamedTuple):
 
 def _length(request: bytes, length: int) -> None:
     if len(request) != length:
-        raise Refused(INCORRECT_LENGTH)
+        raise Refused(Reason.INCORRECT_LENGTH)
 
 
 def _session_control(session: Session, request: bytes, ecu: Ecu, now_s: float) -> tuple[Session, bytes]:
@@ -103,7 +93,7 @@ def _session_control(session: Session, request: bytes, ecu: Ecu, now_s: float) -
 def _reset(session: Session, request: bytes, ecu: Ecu, now_s: float) -> tuple[Session, bytes]:
     _length(request, 2)
     if ecu.armed or not ecu.can_restart():
-        raise Refused(CONDITIONS_NOT_CORRECT)
+        raise Refused(Reason.CONDITIONS_NOT_CORRECT)
     return begin(session, DEFAULT)._replace(restarts=True), bytes([request[1] & ~SUPPRESS])
 
 
@@ -111,9 +101,9 @@ def _clear(session: Session, request: bytes, ecu: Ecu, now_s: float) -> tuple[Se
     _length(request, 4)
     group = int.from_bytes(request[1:4], "big")
     if group != ALL_GROUPS and group not in ecu.memory.entries:
-        raise Refused(OUT_OF_RANGE)
+        raise Refused(Reason.OUT_OF_RANGE)
     if not ecu.clear(None if group == ALL_GROUPS else group):
-        raise Refused(PROGRAMMING_FAILURE)
+        raise Refused(Reason.PROGRAMMING_FAILURE)
     return session, b""
 
 
@@ -124,14 +114,14 @@ def _read_faults(session: Session, request: bytes, ecu: Ecu, now_s: float) -> tu
 def _read_data(session: Session, request: bytes, ecu: Ecu, now_s: float) -> tuple[Session, bytes]:
     numbers = request[1:]
     if not numbers or len(numbers) % 2 or len(numbers) > 2 * MOST_IDENTIFIERS:
-        raise Refused(INCORRECT_LENGTH)
+        raise Refused(Reason.INCORRECT_LENGTH)
     text = b""
     for at in range(0, len(numbers), 2):
         number = int.from_bytes(numbers[at : at + 2], "big")
         data = bytes([session.kind]) if number == SESSION else ecu.read(number)
         text += numbers[at : at + 2] + data if data is not None else b""
     if not text:
-        raise Refused(OUT_OF_RANGE)
+        raise Refused(Reason.OUT_OF_RANGE)
     return session, text
 
 
@@ -147,15 +137,15 @@ def _security_access(session: Session, request: bytes, ecu: Ecu, now_s: float) -
 
 def _communication_control(session: Session, request: bytes, ecu: Ecu, now_s: float) -> tuple[Session, bytes]:
     _length(request, 3)
-    raise Refused(CONDITIONS_NOT_CORRECT)
+    raise Refused(Reason.CONDITIONS_NOT_CORRECT)
 
 
 def _routine_control(session: Session, request: bytes, ecu: Ecu, now_s: float) -> tuple[Session, bytes]:
     if len(request) < 4:
-        raise Refused(INCORRECT_LENGTH)
+        raise Refused(Reason.INCORRECT_LENGTH)
     kind, routine = request[1] & ~SUPPRESS, int.from_bytes(request[2:4], "big")
     if routine not in ROUTINES:
-        raise Refused(OUT_OF_RANGE)
+        raise Refused(Reason.OUT_OF_RANGE)
     if routine in WORKS:
         ecu.work(*_work(session, request))
         return session, bytes([kind]) + request[2:4]
@@ -163,7 +153,7 @@ def _routine_control(session: Session, request: bytes, ecu: Ecu, now_s: float) -
     if kind == START:
         session = session._replace(tested=ecu.self_test())
     elif not session.tested:
-        raise Refused(SEQUENCE_ERROR)
+        raise Refused(Reason.SEQUENCE_ERROR)
     return session, bytes([kind]) + request[2:4] + session.tested
 
 
@@ -176,16 +166,16 @@ def _work(session: Session, request: bytes) -> tuple[Kind, dict[str, float]]:
     """Return the work that a request to write, or to start a routine, asks for. Raises Refused."""
     if request[0] == WRITE_DATA:
         if len(request) < 4:
-            raise Refused(INCORRECT_LENGTH)
+            raise Refused(Reason.INCORRECT_LENGTH)
         if int.from_bytes(request[1:3], "big") != PAD_THICKNESS.number:
-            raise Refused(OUT_OF_RANGE)
+            raise Refused(Reason.OUT_OF_RANGE)
         kind, length = Kind.MEASURED_PADS, 3 + length_of(PAD_THICKNESS)
     elif request[1] & ~SUPPRESS != START:
-        raise Refused(SUBFUNCTION_NOT_SUPPORTED)
+        raise Refused(Reason.SUBFUNCTION_NOT_SUPPORTED)
     else:
         kind, length = WORKS[int.from_bytes(request[2:4], "big")]
     if not session.unlocked:
-        raise Refused(ACCESS_DENIED)
+        raise Refused(Reason.ACCESS_DENIED)
     _length(request, length)
     values: Sequence[float | None] = ()
     if kind == Kind.MEASURED_PADS:
@@ -194,7 +184,7 @@ def _work(session: Session, request: bytes) -> tuple[Kind, dict[str, float]]:
         values = [0.0 if request[4] >> i & 1 else None for i in range(len(CORNERS))]
     done = {corner: value for corner, value in zip(CORNERS, values, strict=False) if value is not None}
     if not done and kind != Kind.FORGET:
-        raise Refused(OUT_OF_RANGE)
+        raise Refused(Reason.OUT_OF_RANGE)
     return kind, done
 
 
@@ -255,32 +245,34 @@ def respond(
     if service.subfunctions and request[1] & SUPPRESS:
         return session, b""
     response = bytes([request[0] + POSITIVE]) + text
-    return session, response if len(response) <= LONGEST_MESSAGE else negative(request[0], RESPONSE_TOO_LONG)
+    if len(response) > LONGEST_MESSAGE:
+        response = negative(request[0], Reason.RESPONSE_TOO_LONG)
+    return session, response
 
 
 def _allowed(session: Session, request: bytes) -> Service:
     """Return the service that a request asks for. Raises Refused."""
     service = SERVICES.get(request[0])
     if service is None:
-        raise Refused(SERVICE_NOT_SUPPORTED)
+        raise Refused(Reason.SERVICE_NOT_SUPPORTED)
     if session.kind == DEFAULT and not service.in_default:
-        raise Refused(SERVICE_NOT_IN_SESSION)
+        raise Refused(Reason.SERVICE_NOT_IN_SESSION)
     if service.subfunctions:
         if len(request) < 2:
-            raise Refused(INCORRECT_LENGTH)
+            raise Refused(Reason.INCORRECT_LENGTH)
         if request[1] & ~SUPPRESS not in service.subfunctions:
-            raise Refused(SUBFUNCTION_NOT_SUPPORTED)
+            raise Refused(Reason.SUBFUNCTION_NOT_SUPPORTED)
     return service
 
 
 def pending(session: Session, request: bytes, ecu: Ecu) -> bytes:
     """Return what to send before the response, as that may come later than P2; empty: it comes in time."""
     if _is_work(session, request):
-        return negative(request[0], PENDING)
+        return negative(request[0], Reason.PENDING)
     group = int.from_bytes(request[1:4], "big")
     clears = request[:1] == bytes([CLEAR]) and len(request) == 4
     lasts = clears and ecu.clearing_lasts and (group == ALL_GROUPS or group in ecu.memory.entries)
-    return negative(CLEAR, PENDING) if lasts else b""
+    return negative(CLEAR, Reason.PENDING) if lasts else b""
 
 
 def _is_work(session: Session, request: bytes) -> bool:

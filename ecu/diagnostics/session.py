@@ -6,6 +6,7 @@ A session is a value: a service takes one and returns the next, so that a reques
 import hmac
 import math
 from collections.abc import Callable
+from enum import IntEnum
 from typing import Final, NamedTuple
 
 from ecu.contract.work import Kind
@@ -18,46 +19,43 @@ S3_S: Final = 5.0
 P2_MS: Final = 50
 P2_STAR_MS: Final = 5000
 
-SERVICE_NOT_SUPPORTED: Final = 0x11
-SUBFUNCTION_NOT_SUPPORTED: Final = 0x12
-INCORRECT_LENGTH: Final = 0x13
-RESPONSE_TOO_LONG: Final = 0x14
-BUSY: Final = 0x21
-CONDITIONS_NOT_CORRECT: Final = 0x22
-SEQUENCE_ERROR: Final = 0x24
-OUT_OF_RANGE: Final = 0x31
-ACCESS_DENIED: Final = 0x33
-INVALID_KEY: Final = 0x35
-ATTEMPTS_EXCEEDED: Final = 0x36
-DELAY_NOT_EXPIRED: Final = 0x37
-PROGRAMMING_FAILURE: Final = 0x72
-PENDING: Final = 0x78
-SUBFUNCTION_NOT_IN_SESSION: Final = 0x7E
-SERVICE_NOT_IN_SESSION: Final = 0x7F
-REASONS: Final = {
-    SERVICE_NOT_SUPPORTED: "serviceNotSupported",
-    SUBFUNCTION_NOT_SUPPORTED: "subFunctionNotSupported",
-    INCORRECT_LENGTH: "incorrectMessageLengthOrInvalidFormat",
-    RESPONSE_TOO_LONG: "responseTooLong",
-    BUSY: "busyRepeatRequest",
-    CONDITIONS_NOT_CORRECT: "conditionsNotCorrect",
-    SEQUENCE_ERROR: "requestSequenceError",
-    OUT_OF_RANGE: "requestOutOfRange",
-    ACCESS_DENIED: "securityAccessDenied",
-    INVALID_KEY: "invalidKey",
-    ATTEMPTS_EXCEEDED: "exceededNumberOfAttempts",
-    DELAY_NOT_EXPIRED: "requiredTimeDelayNotExpired",
-    PROGRAMMING_FAILURE: "generalProgrammingFailure",
-    PENDING: "requestCorrectlyReceived-ResponsePending",
-    SUBFUNCTION_NOT_IN_SESSION: "subFunctionNotSupportedInActiveSession",
-    SERVICE_NOT_IN_SESSION: "serviceNotSupportedInActiveSession",
-}
+
+class Reason(IntEnum):
+    """Code of a negative response, with its name in the standard."""
+
+    text: str
+
+    SERVICE_NOT_SUPPORTED = 0x11, "serviceNotSupported"
+    SUBFUNCTION_NOT_SUPPORTED = 0x12, "subFunctionNotSupported"
+    INCORRECT_LENGTH = 0x13, "incorrectMessageLengthOrInvalidFormat"
+    RESPONSE_TOO_LONG = 0x14, "responseTooLong"
+    BUSY = 0x21, "busyRepeatRequest"
+    CONDITIONS_NOT_CORRECT = 0x22, "conditionsNotCorrect"
+    SEQUENCE_ERROR = 0x24, "requestSequenceError"
+    OUT_OF_RANGE = 0x31, "requestOutOfRange"
+    ACCESS_DENIED = 0x33, "securityAccessDenied"
+    INVALID_KEY = 0x35, "invalidKey"
+    ATTEMPTS_EXCEEDED = 0x36, "exceededNumberOfAttempts"
+    DELAY_NOT_EXPIRED = 0x37, "requiredTimeDelayNotExpired"
+    PROGRAMMING_FAILURE = 0x72, "generalProgrammingFailure"
+    PENDING = 0x78, "requestCorrectlyReceived-ResponsePending"
+    SUBFUNCTION_NOT_IN_SESSION = 0x7E, "subFunctionNotSupportedInActiveSession"
+    SERVICE_NOT_IN_SESSION = 0x7F, "serviceNotSupportedInActiveSession"
+
+    def __new__(cls, code: int, text: str) -> "Reason":
+        """Return a member that is the number."""
+        member = int.__new__(cls, code)
+        member._value_, member.text = code, text
+        return member
+
+
+REASONS: Final = {int(one): one.text for one in Reason}
 SILENT_WHEN_FUNCTIONAL: Final = (
-    SERVICE_NOT_SUPPORTED,
-    SUBFUNCTION_NOT_SUPPORTED,
-    OUT_OF_RANGE,
-    SUBFUNCTION_NOT_IN_SESSION,
-    SERVICE_NOT_IN_SESSION,
+    Reason.SERVICE_NOT_SUPPORTED,
+    Reason.SUBFUNCTION_NOT_SUPPORTED,
+    Reason.OUT_OF_RANGE,
+    Reason.SUBFUNCTION_NOT_IN_SESSION,
+    Reason.SERVICE_NOT_IN_SESSION,
 )
 """Not sent in answer to a request to all ECUs."""
 
@@ -70,10 +68,10 @@ DELAY_S: Final = 10.0
 class Refused(Exception):
     """A negative response, by its code."""
 
-    def __init__(self, code: int, session: "Session | None" = None) -> None:
+    def __init__(self, code: Reason, session: "Session | None" = None) -> None:
         self.code, self.session = code, session
         """The session after it, None: as before."""
-        super().__init__(REASONS[code])
+        super().__init__(code.text)
 
 
 class Session(NamedTuple):
@@ -143,9 +141,9 @@ def give_seed(session: Session, ecu: Ecu, now_s: float) -> tuple[Session, bytes]
     Asked for again before its key it is the same (ISO 14229-1): its first response may be late.
     """
     if not ecu.secret:
-        raise Refused(CONDITIONS_NOT_CORRECT)
+        raise Refused(Reason.CONDITIONS_NOT_CORRECT)
     if now_s < session.delayed_until_s:
-        raise Refused(DELAY_NOT_EXPIRED)
+        raise Refused(Reason.DELAY_NOT_EXPIRED)
     if session.unlocked:
         return session, bytes(SEED_BYTES)
     seed = session.seed or ecu.new_seed()
@@ -155,11 +153,11 @@ def give_seed(session: Session, ecu: Ecu, now_s: float) -> tuple[Session, bytes]
 def take_key(session: Session, ecu: Ecu, now_s: float, key: bytes) -> Session:
     """Return the session after a key: a seed is good for one. Raises Refused."""
     if not session.seed:
-        raise Refused(SEQUENCE_ERROR)
+        raise Refused(Reason.SEQUENCE_ERROR)
     if hmac.compare_digest(key, key_of(ecu.secret, session.seed)):
         return session._replace(unlocked=True, seed=b"", wrong_keys=0)
     wrong = session.wrong_keys + 1
     if wrong < ATTEMPTS:
-        raise Refused(INVALID_KEY, session._replace(seed=b"", wrong_keys=wrong))
+        raise Refused(Reason.INVALID_KEY, session._replace(seed=b"", wrong_keys=wrong))
     later = session._replace(seed=b"", wrong_keys=0, delayed_until_s=now_s + DELAY_S)
-    raise Refused(ATTEMPTS_EXCEEDED, later)
+    raise Refused(Reason.ATTEMPTS_EXCEEDED, later)

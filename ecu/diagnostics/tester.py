@@ -20,7 +20,7 @@ from ecu.diagnostics.identifiers import (
     to_values,
 )
 from ecu.diagnostics.services import ALL_GROUPS, CLEAR, NEGATIVE, POSITIVE, READ_DATA, READ_FAULTS
-from ecu.diagnostics.session import P2_STAR_MS, PENDING, REASONS
+from ecu.diagnostics.session import P2_STAR_MS, REASONS, Reason
 from ecu.diagnostics.tester_work import HINTS, WORKS, Ask, do, request_of, secret_of
 from ecu.diagnostics.transport import Link
 from ecu.diagnostics.trouble_codes import BY_NUMBER as CODES
@@ -56,7 +56,7 @@ class Tester:
                 heard = self._link.next()
                 if heard is None:
                     continue
-                if heard.data[:3] == bytes([NEGATIVE, request[0], PENDING]):
+                if heard.data[:3] == bytes([NEGATIVE, request[0], Reason.PENDING]):
                     begun_s, patience_s = self._now_s(), PATIENCE_PENDING_S
                 elif heard.data[:1] == bytes([request[0] + POSITIVE]):
                     return heard.data[1:]

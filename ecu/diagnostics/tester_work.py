@@ -19,34 +19,26 @@ from ecu.diagnostics.services import (
     START,
     WRITE_DATA,
 )
-from ecu.diagnostics.session import (
-    ACCESS_DENIED,
-    BUSY,
-    CONDITIONS_NOT_CORRECT,
-    DEFAULT,
-    EXTENDED,
-    INVALID_KEY,
-    OUT_OF_RANGE,
-    PROGRAMMING_FAILURE,
-    key_of,
-)
+from ecu.diagnostics.session import DEFAULT, EXTENDED, Reason, key_of
 from ecu.errors import RunFault, UserError, closest
 from ecu.pads import PLACES, parse_measured
 from ecu.runtime.diagnostics import KEY_OPTION, read_secret
 
 WORKS: Final = ("new-pads", "measured", "forget")
-HINTS: Final = {
-    (SECURITY_ACCESS, CONDITIONS_NOT_CORRECT): f"the ECU has no key; start it with {KEY_OPTION} FILE",
-    (SECURITY_ACCESS, INVALID_KEY): f"--key is another file than that of {KEY_OPTION}",
+HINTS: Final[dict[tuple[int, int], str]] = {
+    (SECURITY_ACCESS, Reason.CONDITIONS_NOT_CORRECT): f"the ECU has no key; start it with {KEY_OPTION} FILE",
+    (SECURITY_ACCESS, Reason.INVALID_KEY): f"--key is another file than that of {KEY_OPTION}",
     **{
         (service, code): hint
         for service in (ROUTINE_CONTROL, WRITE_DATA)
         for code, hint in {
-            CONDITIONS_NOT_CORRECT: "stop, release the brake, wait a second; and the ECU needs --state",
-            OUT_OF_RANGE: "a pad thicker than before, or next to none; give its lining in mm",
-            BUSY: "another change is in progress; ask again",
-            ACCESS_DENIED: "another tester ended the session; ask again",
-            PROGRAMMING_FAILURE: "done, but not stored; the ECU's log says why",
+            Reason.CONDITIONS_NOT_CORRECT: (
+                "stop, release the brake, wait a second; and the ECU needs --state"
+            ),
+            Reason.OUT_OF_RANGE: "a pad thicker than before, or next to none; give its lining in mm",
+            Reason.BUSY: "another change is in progress; ask again",
+            Reason.ACCESS_DENIED: "another tester ended the session; ask again",
+            Reason.PROGRAMMING_FAILURE: "done, but not stored; the ECU's log says why",
         }.items()
     },
 }

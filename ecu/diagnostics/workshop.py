@@ -8,13 +8,7 @@ import structlog
 from ecu.contract.faults import NOT_KEPT, fault_mask
 from ecu.contract.signals import CORNERS
 from ecu.contract.work import Kind, Work
-from ecu.diagnostics.session import (
-    BUSY,
-    CONDITIONS_NOT_CORRECT,
-    OUT_OF_RANGE,
-    PROGRAMMING_FAILURE,
-    Refused,
-)
+from ecu.diagnostics.session import Reason, Refused
 from ecu.errors import UserError
 from ecu.pads import pads, worn_off
 from ecu.recording.ring import RingReader
@@ -38,32 +32,32 @@ class Workshop:
     def do(self, kind: Kind, values: dict[str, float]) -> None:
         """Do it; `values`: thicknesses [mm] by corner where pads were measured. Raises Refused."""
         if not self._kept:
-            raise self._refused(CONDITIONS_NOT_CORRECT, NOWHERE)
+            raise self._refused(Reason.CONDITIONS_NOT_CORRECT, NOWHERE)
         wear = self._wear(values) if kind == Kind.MEASURED_PADS else values
         ring = self._reader.ring
         try:
             begins = worked(self._reader, Work(kind, wear), self._sleep)
         except Busy as busy:
-            raise self._refused(BUSY, str(busy)) from None
+            raise self._refused(Reason.BUSY, str(busy)) from None
         if begins is None:
-            raise self._refused(CONDITIONS_NOT_CORRECT, STANDS_NOT)
+            raise self._refused(Reason.CONDITIONS_NOT_CORRECT, STANDS_NOT)
         stored = wait(lambda: ring.header["followed"][0] >= begins, self._sleep)
         reported = ring.header["written"][0] + 1  # the loop's fault bit is a cycle later
         if not stored or not wait(lambda: ring.header["written"][0] > reported, self._sleep) or self._lost():
-            raise self._refused(PROGRAMMING_FAILURE, NOT_STORED)
+            raise self._refused(Reason.PROGRAMMING_FAILURE, NOT_STORED)
 
     def _wear(self, thicknesses: dict[str, float]) -> dict[str, float]:
         """Return the wear [mm] of measured pads by corner. Raises Refused."""
         learned = self._reader.latest("learned")
         if learned is None:
-            raise self._refused(BUSY, "no cycle yet; try again")
+            raise self._refused(Reason.BUSY, "no cycle yet; try again")
         found = {}
         for i, (corner, pad) in enumerate(zip(CORNERS, pads(self._config), strict=True)):
             if corner in thicknesses:
                 try:
                     found[corner] = worn_off(learned[0]["wear"], pad, i, thicknesses[corner])
                 except UserError as error:
-                    raise self._refused(OUT_OF_RANGE, f"{error.place}: {error.remedy}") from None
+                    raise self._refused(Reason.OUT_OF_RANGE, f"{error.place}: {error.remedy}") from None
         return found
 
     def _lost(self) -> bool:
@@ -71,6 +65,6 @@ class Workshop:
         last = self._reader.newest()
         return last is None or bool(int(fault_mask(last["outputs"])[0]) & NOT_KEPT)
 
-    def _refused(self, code: int, reason: str) -> Refused:
+    def _refused(self, code: Reason, reason: str) -> Refused:
         self._log.warning("service_refused", reason=reason)
         return Refused(code)

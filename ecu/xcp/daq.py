@@ -209,11 +209,6 @@ class DaqLists:
             raise Refused(Error.DAQ_CONFIG)
         return found
 
-    def stop(self) -> None:
-        """Stop all lists."""
-        for one in self.lists:
-            one.running = one.selected = False
-
     def packets(self, number: int, t_mono_ns: int, image: Image) -> Iterator[bytes]:
         """Yield the packets of cycle `number`, which began at `t_mono_ns`, in the order of the lists."""
         for one in self.lists:

@@ -6,7 +6,7 @@ import pytest
 
 from ecu.diagnostics.fault_memory import FaultMemory
 from ecu.diagnostics.services import respond
-from ecu.diagnostics.session import Ecu, Refused, Session
+from ecu.diagnostics.session import Ecu, Reason, Refused, Session
 
 from ..watch.conftest import loop, rings
 
@@ -51,7 +51,7 @@ def tester(world):
 
     def work(kind, values):
         if world.refuses is not None:
-            raise Refused(world.refuses)
+            raise Refused(Reason(world.refuses))
         world.works.append((kind.name, values))
 
     def begin(**fields):
