@@ -90,7 +90,7 @@ class Server:
             clearing_lasts=self._file is not None,
             self_test=self._self_test,
             work=self._work,
-            can_restart=self._can_restart,
+            can_restart=lambda: "NOTIFY_SOCKET" in os.environ and is_held(ring),
             new_seed=lambda: secrets.token_bytes(SEED_BYTES),
             secret=secret,
         )
@@ -189,9 +189,6 @@ class Server:
     def _work(self, kind: Kind, values: dict[str, float]) -> None:
         assert self._workshop is not None  # without a secret nobody gets access
         self._workshop.do(kind, values)
-
-    def _can_restart(self) -> bool:
-        return "NOTIFY_SOCKET" in os.environ and is_held(self._ring)
 
     def _self_test(self) -> bytes:
         assert self.last is not None

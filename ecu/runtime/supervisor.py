@@ -26,8 +26,14 @@ PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 10.0  # less than the ring holds
 CALM_S: Final = 60.0  # a recorder that lived that long restarts after the short pause again
 FINAL_EXITS: Final = (0, 2)
-DIAGNOSTICS_PATIENCE_S: Final = 1.0  # it stores the fault memory
-XCP_PATIENCE_S: Final = 0.5  # it sends the last cycles
+COMPANIONS: Final = (
+    ("--metrics", "ecu.watch.metrics_process", ("--ring", "--metrics"), 0.0),
+    ("--diagnostics", "ecu.diagnostics.process", ("--ring", "--state", "--diagnostics"), 1.0),
+    ("--xcp", "ecu.xcp.process", ("--ring", "--xcp"), 0.5),
+    ("--standby", "ecu.runtime.follow_first", ("--ring",), 0.0),
+)
+"""Option that asks for a process, its module and options, and how long it may take to end [s]: it stores the
+fault memory, it sends the last cycles."""
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -61,17 +67,11 @@ def main(arguments: Sequence[str]) -> int:
 
 def _companions(arguments: Sequence[str]) -> list[Companion]:
     """Start the processes that `arguments` ask for."""
-    companions = []
-    if "--metrics" in arguments:
-        companions.append(Companion("ecu.watch.metrics_process", _picked(arguments, "--ring", "--metrics")))
-    if "--diagnostics" in arguments:
-        picked = _picked(arguments, "--ring", "--state", "--diagnostics")
-        companions.append(Companion("ecu.diagnostics.process", picked, DIAGNOSTICS_PATIENCE_S))
-    if "--xcp" in arguments:
-        companions.append(Companion("ecu.xcp.process", _picked(arguments, "--ring", "--xcp"), XCP_PATIENCE_S))
-    if "--standby" in arguments:
-        companions.append(Companion("ecu.runtime.follow_first", _picked(arguments, "--ring")))
-    return companions
+    return [
+        Companion(module, _picked(arguments, *options), patience_s)
+        for option, module, options, patience_s in COMPANIONS
+        if option in arguments
+    ]
 
 
 def _picked(arguments: Sequence[str], *names: str) -> list[str]:

@@ -88,7 +88,8 @@ def to_record(given: Mapping[str, Any]) -> RecordArray:
     for one in parameters():
         value = _value(given, one.key)
         if one.texts:
-            record[one.key] = NO_WORD if value is None else one.texts.index(_word(value))
+            word = str(value).lower() if isinstance(value, bool) else value
+            record[one.key] = NO_WORD if value is None else one.texts.index(word)
         elif one.length:
             values = value or []
             record[one.key] = [*values, *[np.nan] * (one.length - len(values))]
@@ -120,7 +121,3 @@ def _value(given: Mapping[str, Any], key: str) -> Any:
     for name in key.split("."):
         found = None if found is None else found[name]
     return found
-
-
-def _word(value: object) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)

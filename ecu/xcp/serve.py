@@ -21,7 +21,7 @@ from ecu.xcp.a2l import a2l_text
 from ecu.xcp.calibration import Calibration
 from ecu.xcp.memory import Image, images
 from ecu.xcp.parameters import to_record
-from ecu.xcp.slave import Size, Slave
+from ecu.xcp.slave import Slave
 from ecu.xcp.takeover import Takeover
 from ecu.xcp.transport import CAN, ETHERNET, Can, End, Tcp, Udp
 
@@ -50,7 +50,9 @@ class Server:
         """Packets with measured data that wait for room."""
         calibration = self._calibration(settings) if settings.key else None
         clock = lambda: round(1e9 * monotonic_s())  # noqa: E731
-        self.slave = Slave(self._size(), lambda: self._image, clock, self._a2l, calibration)
+        a2l = lambda: a2l_text([self.transport], self._configuration)  # noqa: E731
+        size = CAN if self.transport.kind == "can" else ETHERNET
+        self.slave = Slave(size, lambda: self._image, clock, a2l, calibration)
         self.place = Place("xcp", lambda: self._open(settings))
 
     def _calibration(self, settings: Settings) -> Calibration:
@@ -63,12 +65,6 @@ class Server:
         if self._takeover is not None:
             return self._takeover.parameters_of(cycles)
         return np.repeat(self._parameters, len(cycles))
-
-    def _size(self) -> Size:
-        return CAN if self.transport.kind == "can" else ETHERNET
-
-    def _a2l(self) -> str:
-        return a2l_text([self.transport], self._configuration)
 
     def _open(self, settings: Settings) -> End:
         transport = self.transport
@@ -108,12 +104,15 @@ class Server:
         try:
             for command in end.commands(self._wait_s()):
                 self._answer(end, command)
-            self.follow()
-            while self._due and end.send(self._due[0]):
-                self._due.popleft()
+            self._send_measured(end)
         except (can.CanError, OSError) as error:
             self._end_session()
             self.place.lose(error)
+
+    def _send_measured(self, end: End) -> None:
+        self.follow()
+        while self._due and end.send(self._due[0]):
+            self._due.popleft()
 
     def _wait_s(self) -> float:
         if self._due:
@@ -134,9 +133,7 @@ class Server:
         """Send what is left and say that the session has ended."""
         end = self.place.end()
         if end is not None and self.slave.connected:
-            self.follow()
-            while self._due and end.send(self._due[0]):
-                self._due.popleft()
+            self._send_measured(end)
             end.send(self._end_session())
         self.place.close()
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from brakelab.replay.quality import Findings
 from brakelab.replay.summary import errors_of, judged
-from brakelab.results.brakes import LEARNED, BrakeBook, BrakeRow
+from brakelab.results.brakes import LEARNED, BrakeBook
 from brakelab.results.prediction import corners
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CORNERS, CYCLE_NS, HOLDING, OBSERVING, OUTPUT
@@ -89,7 +89,7 @@ class DriveBook:
             "predicted": found.counted,
             "prediction_error": known(found.median),
             "prediction_bias": known(found.bias),
-            "brake_energy": _energy(brakings),
+            "brake_energy": float(np.nansum([row.brake_energy for row in brakings])),
             **self._friction(),
             "degraded": sum(found.faulty_rows for found in findings) * _PERIOD,
         }
@@ -103,10 +103,6 @@ class DriveBook:
                 mean = float(corners(self.last, name)[wheels].mean())
                 columns[f"{name}_{axle}"] = known(mean) if learned else None
         return columns
-
-
-def _energy(brakings: Sequence[BrakeRow]) -> float:
-    return float(np.nansum([row.brake_energy for row in brakings]))
 
 
 def known(value: float) -> float | None:

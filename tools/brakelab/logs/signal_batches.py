@@ -41,8 +41,8 @@ def _is_mdf(path: Path) -> bool:
 def plain_batches(path: Path, quality: SignalQuality) -> Iterator[Batch]:
     """Yield the rows of a file with the contract's names; the first has no row, but all names of the file."""
     if _is_mdf(path):
-        return _mdf_batches(path, quality)
-    return _csv_batches(path, quality) if is_csv(path) else _parquet_batches(path, quality)
+        return _mdf_rows(path, None, quality)
+    return _csv_batches(path, quality) if is_csv(path) else _parquet_rows(path, None, quality)
 
 
 class Columns(NamedTuple):
@@ -104,7 +104,7 @@ def rows_of(path: Path, columns: Columns, wanted: Sequence[str], quality: Signal
     if columns.header is not None:
         return _headed_csv_batches(path, columns.header, list(wanted), quality)
     if _is_mdf(path):
-        return _mdf_channels(path, [name for name in wanted if name != MDF_TIME], quality)
+        return _mdf_rows(path, [name for name in wanted if name != MDF_TIME], quality)
     return _parquet_rows(path, list(wanted), quality)
 
 
@@ -116,10 +116,14 @@ def _headed_csv_batches(
         yield Batch(batch, lines)
 
 
-def _mdf_channels(path: Path, wanted: list[str], quality: SignalQuality) -> Iterator[Batch]:
-    channels = open_channels(path, wanted)
+def _mdf_rows(path: Path, wanted: list[str] | None, quality: SignalQuality) -> Iterator[Batch]:
+    """Yield rows of the channels `wanted`; None: of the inputs, after a batch of all names."""
+    channels = open_channels(path, INPUT if wanted is None else wanted)
     try:
         quality.zero_ns = channels.measurement.start_ns()
+        if wanted is None:
+            inputs = [name for places in channels.groups.values() for name in places]
+            yield _names_only(["t", *inputs, *channels.unknown])
         yield from _numbered(read_channels(path, channels, quality))
     finally:
         channels.measurement.close()
@@ -136,10 +140,6 @@ def _names_only(names: list[str]) -> Batch:
     """Return no row of these columns: unknown ones are listed, not read."""
     rows = pa.RecordBatch.from_arrays([pa.array([], pa.null())] * len(names), names=names)
     return Batch(rows, np.empty(0, np.int64))
-
-
-def _parquet_batches(path: Path, quality: SignalQuality) -> Iterator[Batch]:
-    return _parquet_rows(path, None, quality)
 
 
 def _parquet_rows(path: Path, wanted: list[str] | None, quality: SignalQuality) -> Iterator[Batch]:
@@ -183,17 +183,6 @@ def _note_start(source: pq.ParquetFile, quality: SignalQuality) -> None:
         first = next(source.iter_batches(1, columns=["t"])).column(0)[0].as_py()
         if isinstance(first, float):
             quality.zero_ns = int(start) - round(first * 1e6) * 1000
-
-
-def _mdf_batches(path: Path, quality: SignalQuality) -> Iterator[Batch]:
-    channels = open_channels(path)
-    try:
-        quality.zero_ns = channels.measurement.start_ns()
-        inputs = [name for places in channels.groups.values() for name in places]
-        yield _names_only(["t", *inputs, *channels.unknown])
-        yield from _numbered(read_channels(path, channels, quality))
-    finally:
-        channels.measurement.close()
 
 
 def _csv_batches(path: Path, quality: SignalQuality) -> Iterator[Batch]:

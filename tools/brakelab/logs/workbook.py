@@ -10,6 +10,7 @@ from ecu.errors import UserError
 
 MAGIC: Final = b"PK\x03\x04"
 MOST_BYTES: Final = 1 << 28  # of a part, unpacked: more is no manifest
+WORDS: Final = "xl/sharedStrings.xml"
 _SPACE: Final = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
 _PLACE: Final = re.compile(r"([A-Z]+)(\d+)")
 
@@ -23,7 +24,8 @@ def sheet_rows(where: str, given: bytes) -> list[tuple[int, list[str]]]:
     try:
         with zipfile.ZipFile(io.BytesIO(given)) as book:
             names = book.namelist()
-            words = _words(book, "xl/sharedStrings.xml") if "xl/sharedStrings.xml" in names else []
+            shared = _part(book, WORDS).iter(f"{_SPACE}si") if WORDS in names else ()
+            words = [_text(one) for one in shared]
             sheet = min(
                 (name for name in names if re.fullmatch(r"xl/worksheets/sheet\d+\.xml", name)),
                 key=lambda name: (len(name), name),
@@ -38,10 +40,6 @@ def _part(book: zipfile.ZipFile, name: str) -> ElementTree.Element:
     if book.getinfo(name).file_size > MOST_BYTES:
         raise ValueError(name)
     return ElementTree.fromstring(book.read(name))
-
-
-def _words(book: zipfile.ZipFile, name: str) -> list[str]:
-    return [_text(one) for one in _part(book, name).iter(f"{_SPACE}si")]
 
 
 def _text(element: ElementTree.Element) -> str:

@@ -45,12 +45,8 @@ def read_ahead(blocks: Iterator[Block]) -> Iterator[Block]:
     finally:
         given_up.set()
         while thread.is_alive():
-            _make_room(waiting)
+            while not waiting.empty():
+                waiting.get()
             thread.join(0.01)
     if block.error is not None:
         raise block.error
-
-
-def _make_room(waiting: "Queue[Block | _End]") -> None:
-    while not waiting.empty():
-        waiting.get()
