@@ -174,7 +174,7 @@ def _is_unsure(counters: Record, status: int, stamp_ns: int) -> bool:
 
 
 @kernel
-def _tell_links(totals: Record, inputs: Record) -> None:
+def _write_link_faults(totals: Record, inputs: Record) -> None:
     """Write the fault bit of streams that are loud, and whether a stream's content is unsure."""
     loud = totals.loud_ns > 0 and inputs.t_ns - totals.loud_ns < link.REPORTED_NS
     inputs.e2e_faults = E2E_REJECTIONS if loud else 0
@@ -264,5 +264,5 @@ def receive(
                 hold_request(request, inputs)
     if len(inputs.new) == N_INPUTS:
         settle_request(request, freshness, inputs.t_ns)
-    _tell_links(totals, inputs)
+    _write_link_faults(totals, inputs)
     return index

@@ -22,7 +22,7 @@ from ecu.recording.publish import publish
 from ecu.recording.ring import Ring
 from ecu.runtime.clock import Grid, Histogram
 from ecu.runtime.exchange import LEAD_NS, exchange
-from ecu.runtime.loop import GIVEN_UP_NS, begin, keep_rest, take_frames
+from ecu.runtime.loop import GIVEN_UP_NS, fill_inputs, keep_rest, take_frames
 from ecu.runtime.memory import Ecu, new_loop, new_twin
 
 FAREWELLS: Final = 3  # one may be lost
@@ -97,7 +97,7 @@ def _exchange(ecu: Ecu, channel: Channel, grid: Grid, run: Progress) -> None:
     drained = clock()
     take_frames(ecu.waiting, loop, grid.memory, count, drained)
     loop["status"] = tuple(channel.status())
-    begin(ecu, loop)
+    fill_inputs(ecu, loop)
     received = clock()
     step(ecu.params, ecu.state, ecu.inputs, ecu.outputs)
     stepped = clock()

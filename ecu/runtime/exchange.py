@@ -14,7 +14,7 @@ from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS
 from ecu.jit import kernel
 from ecu.runtime.clock import arrival, follow_realtime
-from ecu.runtime.loop import GIVEN_UP_NS, begin, take_frames
+from ecu.runtime.loop import GIVEN_UP_NS, fill_inputs, take_frames
 from ecu.runtime.memory import Ecu
 from ecu.system_calls import clock_gettime, clock_nanosleep
 
@@ -89,7 +89,7 @@ def exchange(
     )
     drained_ns = _drain(ecu, loop, grid, can)
     read_status(can, state.status)
-    begin(ecu, loop)
+    fill_inputs(ecu, loop)
     received_ns = _now_ns(_CLOCK_BOOTTIME, loop)
     step(ecu.params, ecu.state, ecu.inputs, ecu.outputs)
     stepped_ns = _now_ns(_CLOCK_BOOTTIME, loop)
@@ -122,6 +122,6 @@ def _rehearse(ecu: Ecu, twin: Ecu, loop: RecordArray, twin_loop: RecordArray) ->
     coming = twin.cycle[0]
     coming.t_ns += CYCLE_NS
     coming.t_mono_ns += CYCLE_NS
-    begin(twin, twin_loop)
+    fill_inputs(twin, twin_loop)
     step(twin.params, twin.state, twin.inputs, twin.outputs)
     transmit(twin.transmit_plan, twin.transmission, twin.vector, coming.number, twin.sending)

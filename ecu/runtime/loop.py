@@ -64,7 +64,7 @@ def _stamp(
 
 
 @kernel
-def begin(ecu: Ecu, loop: RecordArray) -> None:
+def fill_inputs(ecu: Ecu, loop: RecordArray) -> None:
     """Fill the inputs of a cycle from the frames that wait; its record has number and tick.
 
     Consumed frames are counted in the cycle's record. Whether this daemon sends is settled: `loop.standby`.
@@ -96,37 +96,6 @@ def begin(ecu: Ecu, loop: RecordArray) -> None:
     inputs.worst_lateness_us = state.worst_lateness_ns / MICROSECOND_NS
     _note(cycle, state, inputs, ecu.reception.totals[0])
     cycle.frames, cycle.late_frames = consumed, late
-
-
-@kernel
-def _note(cycle: Record, state: Record, inputs: Record, totals: Record) -> None:
-    cycle.bus_faults, cycle.overruns = inputs.bus_faults, inputs.overruns
-    cycle.worst_lateness_us = inputs.worst_lateness_us
-    cycle.dropped = state.status.dropped
-    for i in range(_N_E2E):
-        cycle.e2e[i] = totals.e2e[i]
-    cycle.speaks, cycle.clock_set_ns = state.standby.speaks, state.set_ns
-
-
-@kernel
-def _service_faults(state: Record, number: int) -> int:
-    """Return the fault bits known to the service alone in cycle `number`."""
-    status = state.status
-    bits = faults.BUS_OFF if status.bus_off else 0
-    if status.error_passive:
-        bits |= faults.ERROR_PASSIVE
-    if not state.kept:
-        bits |= faults.NOT_KEPT
-    if state.compiled:
-        bits |= faults.COMPILED
-    counters = (status.send_failures, status.dropped, state.foreign, state.overruns)
-    for place in range(len(_COUNTED)):
-        if counters[place] > state.seen[place]:
-            state.seen[place] = counters[place]
-            state.until[place] = number + HOLD_CYCLES
-        if number < state.until[place]:
-            bits |= _COUNTED[place]
-    return bits
 
 
 @kernel
@@ -163,6 +132,37 @@ def _gather(
             beside += 1
         begin = end
     return consumed, late, foreign, beside
+
+
+@kernel
+def _service_faults(state: Record, number: int) -> int:
+    """Return the fault bits known to the service alone in cycle `number`."""
+    status = state.status
+    bits = faults.BUS_OFF if status.bus_off else 0
+    if status.error_passive:
+        bits |= faults.ERROR_PASSIVE
+    if not state.kept:
+        bits |= faults.NOT_KEPT
+    if state.compiled:
+        bits |= faults.COMPILED
+    counters = (status.send_failures, status.dropped, state.foreign, state.overruns)
+    for place in range(len(_COUNTED)):
+        if counters[place] > state.seen[place]:
+            state.seen[place] = counters[place]
+            state.until[place] = number + HOLD_CYCLES
+        if number < state.until[place]:
+            bits |= _COUNTED[place]
+    return bits
+
+
+@kernel
+def _note(cycle: Record, state: Record, inputs: Record, totals: Record) -> None:
+    cycle.bus_faults, cycle.overruns = inputs.bus_faults, inputs.overruns
+    cycle.worst_lateness_us = inputs.worst_lateness_us
+    cycle.dropped = state.status.dropped
+    for i in range(_N_E2E):
+        cycle.e2e[i] = totals.e2e[i]
+    cycle.speaks, cycle.clock_set_ns = state.standby.speaks, state.set_ns
 
 
 @kernel
