@@ -34,7 +34,7 @@ def ailments(now_s: float) -> list[str]:
         except UserError as error:  # it ended just now
             lines.append(str(error))
             continue
-        last = reader.go_on_after(int(reader.ring.header[0]["written"]) - 1)
+        last = reader.newest()
         age_s = math.inf if last is None else now_s - 1e-9 * float(last["cycle"]["t_mono_ns"][0])
         if why := ailment(reader, age_s):
             lines.append(f"{daemon.label}: {why}")

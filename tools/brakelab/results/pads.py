@@ -44,28 +44,20 @@ class PadState(NamedTuple):
 def pads_of(params: RecordArray, learned: RecordArray, config: Config) -> list[PadState]:
     """Return the pads of the four corners by `learned` (`LEARNED`, shape (1,))."""
     axles = (config.front, config.front, config.rear, config.rear)
-    return [
-        PadState(
-            found.corner,
-            found.thickness,
-            found.sigma,
-            found.mass,
-            found.driven,
-            found.remaining,
-            found.remaining_low,
-            found.remaining_high,
-            found.scale,
-            found.measurements,
-            found.told,
-            lining.thickness_new,
-            lining.thickness_worn,
-            "pad" in axle.model_fields_set,
-            axle.dust is not None,
+    states = []
+    for found, lining, axle in zip(appraise(params, learned, config), linings_of(config), axles, strict=True):
+        known = found._asdict()
+        del known["wear"]  # the rows have it
+        states.append(
+            PadState(
+                **known,
+                thickness_new=lining.thickness_new,
+                thickness_worn=lining.thickness_worn,
+                configured="pad" in axle.model_fields_set,
+                emission_model=axle.dust is not None,
+            )
         )
-        for found, lining, axle in zip(
-            appraise(params, learned, config), linings_of(config), axles, strict=True
-        )
-    ]
+    return states
 
 
 def packed(pads: list[PadState]) -> list[dict[str, Any]]:
