@@ -86,6 +86,15 @@ def in_this_process() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(autouse=True, scope="module")
+def nothing_remembered(request: pytest.FixtureRequest) -> Iterator[None]:
+    """What a file's tests keep by `functools.cache`, drives of 10 to 100 MB, ends with them."""
+    yield
+    for one in vars(request.module).values():
+        if hasattr(one, "cache_clear") and one.__module__ == request.module.__name__:
+            one.cache_clear()
+
+
 def _has_multicast() -> bool:
     group = socket.inet_aton("239.74.163.1")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
