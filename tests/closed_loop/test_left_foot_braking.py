@@ -93,16 +93,10 @@ def test_braking_against_the_accelerator_teaches_nothing_and_is_marked(
 
 
 @pytest.mark.parametrize("observer", ["joint", "observer2"])
-def test_where_no_accelerator_is_known_driving_torque_marks_it(
+def test_where_no_accelerator_is_known_driving_torque_marks_it_and_teaches_nothing(
     drive_log: Path, tmp_path: Path, observer: str
 ) -> None:
     log = without(drive_log, "accelerator_position", tmp_path / "one-foot.parquet")
-    _, brakes = run(log, observer, tmp_path / "out.parquet")
-    assert list(brakes["left_out"][::4]) == ["", "driven against the brakes", ""]
-
-
-@pytest.mark.parametrize("observer", ["joint", "observer2"])
-def test_driving_torque_alone_teaches_nothing(drive_log: Path, tmp_path: Path, observer: str) -> None:
-    log = without(drive_log, "accelerator_position", tmp_path / "one-foot.parquet")
     columns, brakes = run(log, observer, tmp_path / "out.parquet")
+    assert list(brakes["left_out"][::4]) == ["", "driven against the brakes", ""]
     assert not changes_in_the_second(columns, brakes)
