@@ -1,5 +1,6 @@
 """Manifests as spreadsheets write them, with the contract's names or with somebody's own."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -62,6 +63,12 @@ def test_a_measured_file_in_the_manifests_place_is_refused_in_one_line(tmp_path:
     (tmp_path / "block.parquet").write_bytes(b"PAR1\x00\r\x00\n")
     with pytest.raises(UserError, match=r"block\.parquet: is no text; save it as CSV"):
         read_manifest(tmp_path / "block.parquet")
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "manifest.csv")
+    with pytest.raises(UserError, match="is no regular file"):
+        read_manifest(tmp_path / "manifest.csv")
 
 
 OWN = "Block;Datei;Masse vorher [kg]\nkühl;b1.csv;0,905123\n"

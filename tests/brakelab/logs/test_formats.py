@@ -1,6 +1,7 @@
 """One drive in every format: the same frames, the same results; what is no log is refused in a line."""
 
 import gzip
+import os
 import shutil
 import subprocess
 import sys
@@ -173,6 +174,13 @@ def test_what_cannot_be_read_gives_one_line(tmp_path: Path, name: str, content: 
         read(path) if kind_of(path) == "frames" else None
     assert str(error.value).startswith(f"{path}: {line}")
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["drive.log", "drive.csv"])
+def test_a_pipe_is_not_waited_for(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(UserError, match="is no regular file"):
+        kind_of(tmp_path / name)
 
 
 def test_decoded_signals_hold_no_frames(tmp_path: Path) -> None:

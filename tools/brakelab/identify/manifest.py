@@ -40,6 +40,8 @@ def read_manifest(path: Path, given: Path | None = None) -> list[tuple[int, dict
     Raises:
         UserError: it cannot be read, lacks a name that is stated, or has another unit.
     """
+    if path.exists() and not path.is_file():
+        raise UserError(str(path), "", "is no regular file; give a manifest as CSV or .xlsx")
     try:
         text = path.read_bytes()
     except OSError as error:

@@ -57,6 +57,8 @@ def format_of(path: Path) -> str:
     suffixes = [suffix.lower() for suffix in path.suffixes]
     packed_name = suffixes[-1:] == [".gz"]
     named = "".join(suffixes[-2:-1] if packed_name else suffixes[-1:])
+    if path.exists() and not path.is_file():
+        raise UserError(str(path), "", "is no regular file; give a log, or write it to one first")
     try:
         packed = is_packed(path)
         with path.open("rb") as plain:
