@@ -113,6 +113,19 @@ def test_parquet_gives_its_units_by_its_metadata(tmp_path: Path, read: Callable[
     np.testing.assert_allclose(block.values[:, 0], [0.0, np.nan, -0.2 * 9.80665], atol=1e-12)
 
 
+def test_parquet_has_its_units_behind_the_names(tmp_path: Path, read: Callable[..., SampleBlock]) -> None:
+    """As a CSV file becomes one in pandas; a map names a column with its unit or without."""
+    path = tmp_path / "drive.parquet"
+    titles = ["v (mph)", "Time [ms]", "ax [g]"]
+    pq.write_table(pa.table(dict(zip(titles, ([1.0, 2.0], [0.0, 10.0], [0.1, 0.3]), strict=True))), path)
+    text = '[inputs]\naccel_x = { column = "ax [g]" }\nvehicle_speed = { column = "v" }\n'
+    block = read(path, text)
+    assert block.t_ns.tolist() == [0, 10_000_000]
+    values = dict(zip(block.places.tolist(), block.values.T, strict=True))
+    np.testing.assert_allclose(values[ACCEL_X], [0.980665, 2.941995])
+    np.testing.assert_allclose(values[INPUT["vehicle_speed"]], [0.44704, 0.89408])
+
+
 def test_channels_of_mdf4_are_mapped(tmp_path: Path, read: Callable[..., SampleBlock]) -> None:
     asammdf = pytest.importorskip("asammdf")
     t = np.arange(30) * 0.01

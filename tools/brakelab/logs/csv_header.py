@@ -83,7 +83,7 @@ def _table(lines: list[str], delimiter: str) -> CsvHeader | None:
         parts = [(name, unit or under) for (name, unit), under in zip(parts, below, strict=True)]
     titles = [title.strip() for title in padded[0]]
     return CsvHeader(
-        _distinct([name for name, _ in parts]), [unit for _, unit in parts], titles, delimiter, first
+        distinct([name for name, _ in parts]), [unit for _, unit in parts], titles, delimiter, first
     )
 
 
@@ -126,7 +126,7 @@ def split_title(title: str) -> tuple[str, str]:
     return (found[1], found[2]) if found else (title, "")
 
 
-def _distinct(names: list[str]) -> list[str]:
+def distinct(names: list[str]) -> list[str]:
     """Return the names, the second of the same with `#2` and so on."""
     counts: dict[str, int] = {}
     distinct = []

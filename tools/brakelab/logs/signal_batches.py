@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from brakelab.logs.column_map import SECONDS, FileUse, MappedFile, resolve, seconds_of, time_column
-from brakelab.logs.csv_header import CsvHeader, find_header
+from brakelab.logs.csv_header import CsvHeader, distinct, find_header, split_title
 from brakelab.logs.csv_rows import csv_columns, csv_rows
 from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.mdf_channels import channel_units, open_channels, read_channels
@@ -74,8 +74,14 @@ def columns_of(path: Path) -> Columns:
         schema = pq.read_schema(path)
     except (pa.ArrowInvalid, OSError) as error:
         raise UserError(str(path), "", f"no readable Parquet file ({error}); write it again") from None
-    units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in schema}
-    return Columns(list(schema.names), units, {}, None)
+    twice = [title for title in schema.names if schema.names.count(title) > 1]
+    if twice:
+        raise UserError(str(path), "columns", f"column {twice[0]} stands twice; keep one")
+    parts = [split_title(title) for title in schema.names]
+    names = distinct([name for name, _ in parts])
+    stated = [(field.metadata or {}).get(b"unit", b"").decode() for field in schema]
+    units = {name: unit or behind for name, unit, (_, behind) in zip(names, stated, parts, strict=True)}
+    return Columns(names, units, dict(zip(schema.names, names, strict=True)), None)
 
 
 def mapped_batches(path: Path, quality: SignalQuality, mapped: MappedFile) -> tuple[FileUse, Iterator[Batch]]:
@@ -105,7 +111,12 @@ def rows_of(path: Path, columns: Columns, wanted: Sequence[str], quality: Signal
         return _headed_csv_batches(path, columns.header, list(wanted), quality)
     if _is_mdf(path):
         return _mdf_rows(path, [name for name in wanted if name != MDF_TIME], quality)
-    return _parquet_rows(path, list(wanted), quality)
+    titles = {name: title for title, name in columns.titles.items()}
+    rows = _parquet_rows(path, [titles[name] for name in wanted], quality)
+    return (
+        Batch(one.rows.rename_columns([columns.titles[title] for title in one.rows.schema.names]), one.places)
+        for one in rows
+    )
 
 
 def _headed_csv_batches(
