@@ -1,6 +1,7 @@
 """Signal files: what is read, and the one line that each damaged input gives."""
 
 import math
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -131,6 +132,10 @@ DAMAGED = {
     "time in ms": (
         {"t": [10.0 * k for k in range(100)], "accel_x": [1.0] * 100},
         "t: t is in seconds, but the rows are 10 s apart; convert it from ms",
+    ),
+    "a clock of whole seconds": (
+        {"t": [float(k // 4) for k in range(40)], "accel_x": [0.1 * k for k in range(40)]},
+        "row 0: from here on 30 of 40 rows have the time of the row before and other values; give time",
     ),
     "Unix time in ns": (
         {"t": [1.7e18, 1.7e18 + 1e7], "accel_x": [1.0, 1.0]},
@@ -302,6 +307,23 @@ def test_rows_that_stand_twice_count_once(
     read = np.concatenate([block.t for block in blocks])
     np.testing.assert_allclose(read, 0.1 * np.arange(90))
     assert (quality.rows, quality.rows_twice, quality.clock_set) == (90, 20, 0)
+
+
+def test_rows_at_one_instant_that_do_not_contradict_each_other_are_read(tmp_path: Path) -> None:
+    """As programs write them that give each signal rows of its own."""
+    speed, accel = [1.0, None, None] * 20, [None, 2.0, 2.0] * 20
+    table = {"t": [0.01 * (k // 3) for k in range(60)], "vehicle_speed": speed, "accel_x": accel}
+    (block,) = read_signals(write(tmp_path / "drive.parquet", table), SignalQuality())
+    assert len(block.t) == 60
+
+
+@pytest.mark.parametrize("form", ["%I:%M:%S.%f %p", "%m/%d/%Y %I:%M:%S.%f %p", "%I:%M:%S.%fpm"])
+def test_a_time_of_day_has_twelve_hours_in_america(tmp_path: Path, form: str) -> None:
+    start = datetime(2026, 11, 28, 12, 59, 59)
+    stamps = [start + timedelta(milliseconds=50 * k) for k in range(40)]
+    log = write(tmp_path / "drive.csv", "\n".join(["t,accel_x", *(f"{t:{form}},1" for t in stamps), ""]))
+    (block,) = read_signals(log, SignalQuality())
+    np.testing.assert_allclose(block.t, 46_799.0 + 0.05 * np.arange(40))
 
 
 @pytest.mark.parametrize("date", ["", "28.11.2026 ", "2026-11-28T", "2026-11-28 "])

@@ -1,5 +1,6 @@
 """`map suggest`, `map check` and `replay` on a signal file of a logger: a drive with curves and brakings."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -118,6 +119,46 @@ def test_a_time_that_is_not_in_seconds_is_refused_or_read_by_its_unit(
     assert 'write its unit behind the name, "Time [us]"' in line
     log.write_text("\n".join([head, units.replace("s,", f"{unit},", 1), *rows]) + "\n")
     assert cli.main(["map", "suggest", str(log)]) == 0
+
+
+def test_parquet_of_a_csv_file_gets_its_map(tmp_path: Path) -> None:
+    log = write_drive(tmp_path / "aim.csv")
+    names, units, *_ = log.read_text().splitlines()
+    titles = [f"{name} [{unit}]" for name, unit in zip(names.split(","), units.split(","), strict=True)]
+    made, maps = tmp_path / "aim.parquet", [tmp_path / "csv.toml", tmp_path / "parquet.toml"]
+    pd.read_csv(log, skiprows=[1]).set_axis(titles, axis=1).to_parquet(made)
+    for one, out in zip((log, made), maps, strict=True):
+        assert cli.main(["map", "suggest", str(one), "--out", str(out)]) == 0
+    csv, parquet = (
+        [line for line in out.read_text("utf-8").splitlines() if line[:1] not in "#t"] for out in maps
+    )
+    assert parquet == csv
+
+
+@pytest.mark.parametrize(
+    ("clock", "says"),
+    [
+        (lambda t: f"14:23:{int(t):02d}", "rows have the time of the row before and other values"),
+        (lambda t: "5.0", "rows have the time of the row before and other values"),
+        (lambda t: f"14:23:{int(t):02d}:{t % 1 * 1e3:03.0f}", "'14:23:00:000' is no time; give s, or the"),
+    ],
+)
+def test_a_time_that_tells_no_rows_apart_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], clock: Callable[[float], str], says: str
+) -> None:
+    log = write_drive(tmp_path / "aim.csv", seconds=30.0)
+    head, units, *rows = log.read_text().splitlines()
+    cells = [row.split(",", 1) for row in rows if row]
+    rows = [f"{clock(float(t))},{rest}" for t, rest in cells]
+    log.write_text("\n".join([head, units.replace("s,", ",", 1), *rows]) + "\n")
+    assert cli.main(["map", "suggest", str(log)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert says in line
+
+
+def test_a_drive_of_a_few_rows_is_too_short(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["map", "suggest", str(write_drive(tmp_path / "aim.csv", seconds=0.3))]) == 2
+    assert ", of which none has 20 numbers at times of their own" in capsys.readouterr().err
 
 
 def test_wheel_speeds_without_a_unit_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

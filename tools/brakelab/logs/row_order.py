@@ -1,7 +1,7 @@
 """Rows of a signal file on one clock and in its order: a clock that was set, rows from the end, rows twice.
 
-Time is a number, or the time of day as programs of measurement export it, `14:23:05,12` with or without a
-date before it; at midnight a day is added. Where the clock was set back by more than a second, or on by more
+Time is a number, or the time of day as programs of measurement export it, `14:23:05,12` or `2:23:05 PM`
+with or without a date before it; at midnight a day is added. Where the clock was set back by more than a second, or on by more
 than an hour, and rows go on from there, time goes on as before it. Rows that stand in the file a second time
 are left out.
 """
@@ -24,7 +24,8 @@ _SET_S: Final = 1e-9 * STEP_NS
 _JUMP_S: Final = 1e-9 * MAX_JUMP_NS
 _DAY_S: Final = 86_400.0
 _CLOCK: Final = (
-    r"(?:^|[ T])(?:(?P<h>\d{1,2}):)?(?P<m>\d{1,2}):(?P<s>\d{1,2}(?:\.\d+)?) *(?:Z|[-+]\d\d:?\d\d)?$"
+    r"(?:^|[ T])(?:(?P<h>\d{1,2}):)?(?P<m>\d{1,2}):(?P<s>\d{1,2}(?:\.\d+)?) *"
+    r"(?:(?P<half>[AaPp])[Mm]|Z|[-+]\d\d:?\d\d)?$"
 )
 _NUMBER: Final = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 
@@ -59,6 +60,8 @@ def numbers(column: "pa.Array[Any]") -> NDArray[np.float64]:
                 pc.replace_substring_regex(part, "^$", "0").cast(pa.float64()).to_numpy(zero_copy_only=False)
                 for part in (pc.struct_field(clock, name) for name in "hms")
             )
+            half = pc.utf8_upper(pc.struct_field(clock, "half")).to_numpy(zero_copy_only=False)
+            hours = np.where((half == "A") | (half == "P"), hours % 12.0 + 12.0 * (half == "P"), hours)
             return np.asarray(3600.0 * hours + 60.0 * minutes + seconds, np.float64)
         column = pc.if_else(pc.match_substring_regex(text, _NUMBER), text, pa.scalar(None, pa.string()))
     try:

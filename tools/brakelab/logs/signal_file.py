@@ -7,7 +7,7 @@ input at one instant the last counts.
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
@@ -123,6 +123,7 @@ def _read(path: Path, quality: SignalQuality, mapped: MappedFile | None) -> Iter
                     f"{place_of(path, places[infinite[0]])}, {name}",
                     "infinite value; write null or NaN where there is no sample",
                 )
+        refuse_one_instant(path, place_of(path, places[0]), t_ns, values)
         quality.rows += len(t)
         quality.samples += int(np.count_nonzero(~np.isnan(values)))
         inputs = np.array([one.place for one in use.columns], np.int64)
@@ -145,6 +146,26 @@ def check_seconds(path: Path, name: str, t: NDArray[np.float64], or_else: str) -
     if found:
         remedy = f"convert it from ms, us or ns, or give every sample{or_else}"
         raise UserError(str(path), name, f"{name} is in seconds, but {found}; {remedy}")
+
+
+def refuse_one_instant(path: Path, place: str, t: NDArray[Any], values: NDArray[np.float64]) -> None:
+    """Refuse rows of which most share their time with the one before and differ from it: one would count.
+
+    Args:
+        path: of the file.
+        place: of the rows in it.
+        t: of the rows, shape (rows,).
+        values: of their cells, NaN where there is none, shape (rows, columns).
+
+    Raises:
+        UserError: they do.
+    """
+    before, here = values[:-1], values[1:]
+    differ = ((here < before) | (here > before)).any(axis=1)
+    lost = int(np.count_nonzero(differ & (np.diff(t) == 0)))
+    if len(t) > FEW_ROWS and 2 * lost > len(t):
+        found = f"from here on {lost} of {len(t)} rows have the time of the row before and other values"
+        raise UserError(str(path), place, f"{found}; give time in steps as fine as the rows, in ms")
 
 
 def _check_span(

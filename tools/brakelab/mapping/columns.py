@@ -12,7 +12,7 @@ from brakelab.logs.physics.lags import RADIUS, lags
 from brakelab.logs.physics.samples import SAMPLED, Car, InputSeries
 from brakelab.logs.row_order import in_order, numbers
 from brakelab.logs.signal_batches import Columns, columns_of, rows_of, time_of
-from brakelab.logs.signal_file import check_seconds
+from brakelab.logs.signal_file import check_seconds, refuse_one_instant
 from brakelab.mapping.map_text import input_lines, needs_radius, radius_line
 from brakelab.mapping.motion import Found, Motion, contract_unit
 from brakelab.mapping.names import converts
@@ -22,28 +22,33 @@ from ecu.contract.signals import INPUT, without_corner
 from ecu.errors import UserError
 
 FLAG: Final = {0.0, 1.0}
+SHOWN: Final = 30  # characters of a cell
 
 
 def read_column_series(log: Path, quality: SignalQuality) -> tuple[Columns, list[Series]]:
     """Return the columns of a signal file, and those of numbers as series.
 
     Raises:
-        UserError: the file has no column of time, or no row.
+        UserError: the file has no column of time or no row, or its time is too coarse for its rows.
     """
     columns = columns_of(log)
     time, seconds = time_of(log, columns)
     names = [name for name in columns.names if name != time]
     parts: dict[str, list[Vector]] = {name: [] for name in [time, *names]}
     batches = in_order(log, rows_of(log, columns, [time, *names], quality), time, seconds, quality)
+    first = ""
     for batch, _ in the_first(batches, lambda one: len(parts) * one.rows.num_rows):
+        first = first or "".join(map(str, batch.column(time)[:1]))
         for name, values in parts.items():
             values.append(numbers(batch.column(name)))
     read = {name: np.concatenate(parts.pop(name) or [np.empty(0)]) for name in [*parts]}
     t = read[time] * seconds
     if not np.isfinite(t).any():
-        raise UserError(str(log), time, "holds no time; give a file with rows")
+        remedy = f"{first[:SHOWN]!r} is no time; give s, or the time of day as 14:23:05.12"
+        raise UserError(str(log), time, remedy if len(t) else "holds no time; give a file with rows")
     known = t[np.isfinite(t)]
     check_seconds(log, time, known, f'; or write its unit behind the name, "{time} [us]"')
+    refuse_one_instant(log, time, t, np.column_stack([read[name] for name in names]))
     t = t - known[0]
     series = [_series(name, columns.units.get(name, ""), t, read[name]) for name in names]
     return columns, [one for one in series if len(one.t) >= FEWEST_FRAMES]

@@ -20,7 +20,7 @@ from brakelab.mapping.map_text import input_lines, needs_radius, radius_line
 from brakelab.mapping.motion import Found, wheel_speeds
 from brakelab.mapping.names import COUNTING, converts, words
 from brakelab.mapping.physics import propose
-from brakelab.mapping.series import Series, read_series
+from brakelab.mapping.series import FEWEST_FRAMES, Series, read_series
 from brakelab.mapping.sources import Source, other_sources
 from brakelab.mapping.torque import FORMULA, brake_torque, stand_in
 from brakelab.replay.log import log_size
@@ -118,6 +118,8 @@ def _suggest_columns(log: Path, out: Path | None, car: Car) -> None:
     found, motion = propose(series, car)
     if motion is None:
         among = f"no speed by its name and unit among {', '.join(columns.names[:SHOWN])}"
+        if not series:
+            among += f", of which none has {FEWEST_FRAMES} numbers at times of their own"
         raise UserError(str(log), "", f"{among}; write the map by hand (docs/signal-maps.md)")
     wheel = found[0].series
     _refuse_unitless(log, wheel, f'write it behind the names: "{wheel.signal} [km/h]"', car)
