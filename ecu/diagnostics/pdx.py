@@ -27,6 +27,7 @@ from ecu.diagnostics.read_faults import BY_MASK
 from ecu.diagnostics.server import SELF_TESTS
 from ecu.diagnostics.session import DEFAULT, EXTENDED, KEY_BYTES, SEED_BYTES
 from ecu.diagnostics.trouble_codes import TROUBLE_CODES
+from ecu.errors import UserError
 from ecu.output import give
 
 NAME: Final = "brake_ecu"
@@ -38,7 +39,9 @@ Field = tuple[str, str]
 
 
 def pdx(out: Path) -> None:
-    """Write the file."""
+    """Write the file. Raises UserError for one by another name."""
+    if out.suffix.lower() != ".pdx":
+        raise UserError("--out", str(out), "testers know the file by its name; let it end in .pdx")
     document = Xml.tostring(_document(), encoding="UTF-8", xml_declaration=True)
     with ZipFile(out, "w", ZIP_DEFLATED) as file:
         file.writestr(f"{NAME}.odx-d", document)

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from ecu import __version__
+from ecu.errors import UserError
 from ecu.output import give, policy
 from ecu.runtime.xcp import LOOPBACK, Transport, parse_transport
 from ecu.settings.config import load_config
@@ -32,8 +33,10 @@ def a2l(config: Path | None, transports: Sequence[str] | None, out: Path | None)
     """Write the file, or print it.
 
     Raises:
-        UserError: a wrong configuration or transport.
+        UserError: a wrong configuration or transport, or a file by another name.
     """
+    if out is not None and out.suffix.lower() != ".a2l":
+        raise UserError("--out", str(out), "masters know the file by its name; let it end in .a2l")
     given = None if config is None else load_config(config).model_dump()
     places = [parse_transport(one) for one in transports] if transports else USUAL
     text = a2l_text(places, given)

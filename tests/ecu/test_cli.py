@@ -150,6 +150,17 @@ def test_nothing_is_looked_through_when_the_process_ends() -> None:
     assert said.stdout == "True\n"
 
 
+@pytest.mark.parametrize("words", ["a2l --config car.toml", "pdx"])
+def test_no_file_of_another_kind_is_overwritten(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    content = Path("car.toml").write_text('include = "suv"\n')
+    assert cli.main([*words.split(), "--out", "car.toml"]) == 2
+    assert "brake-ecu: --out: car.toml: " in capsys.readouterr().err
+    assert Path("car.toml").stat().st_size == content
+
+
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--version"]) == 0
     assert capsys.readouterr().out == f"brake-ecu {__version__}\n"
