@@ -268,9 +268,19 @@ def _add_commands() -> int:
     return len(others)
 
 
+def _open_streams() -> None:
+    """Open those of the standard streams that were closed: the next files would take their places."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            stream = open(os.devnull, mode, encoding="utf-8")  # noqa: SIM115
+            os.set_inheritable(stream.fileno(), True)
+            setattr(sys, name, stream)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run one command line and return its exit code."""
     arguments = arguments or sys.argv[1:] or ["--help"]
+    _open_streams()
     for stream in (sys.stdout, sys.stderr):  # of a locale, or a file's name, that lacks a character of a line
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")

@@ -161,6 +161,22 @@ def test_no_file_of_another_kind_is_overwritten(
     assert Path("car.toml").stat().st_size == content
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("config check nosuch 2>&-", ""),
+        ("config new --out car.toml <&-", "brake-ecu: config new: missing: vehicle.mass"),
+    ],
+)
+def test_a_closed_stream_is_an_empty_one(words: str, says: str, tmp_path: Path) -> None:
+    """Errors stay out of the output where nobody reads them, and questions have no answer."""
+    command = ["sh", "-c", f'"$0" -P -m ecu.cli {words}', sys.executable]
+    ended = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert ended.returncode == 2
+    assert "nosuch" not in ended.stdout
+    assert ended.stderr.startswith(says)
+
+
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--version"]) == 0
     assert capsys.readouterr().out == f"brake-ecu {__version__}\n"
