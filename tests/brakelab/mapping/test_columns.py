@@ -156,6 +156,28 @@ def test_a_time_that_tells_no_rows_apart_is_refused(
     assert says in line
 
 
+def test_damage_and_columns_that_stand_twice_are_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By all that read them; of one heading the first column is read, with its unit or without."""
+    log, out = write_drive(tmp_path / "aim.csv"), tmp_path / "map.toml"
+    lines = log.read_text().replace("BrakePress\n", "BrakePress,YawRate\n").replace("bar\n", "bar,deg/s\n")
+    head, units, _, *rows = lines.splitlines()
+    log.write_text("\n".join([head, units, *(f"{row},0.0" for row in rows), "90.0,1.0"]))
+    said = [
+        f"{log}: line 4003: the last line is cut off and was not used",
+        f'{log}: columns that stand twice: YawRate; the first is read, "YawRate#2" the second',
+    ]
+    assert cli.main(["map", "suggest", str(log), "--out", str(out)]) == 0
+    assert capsys.readouterr().err.splitlines()[:2] == said
+    assert 'yaw_rate = { column = "YawRate", factor = -1 }' in out.read_text("utf-8")
+    out.write_text(out.read_text("utf-8").replace('"YawRate"', '"YawRate [deg/s]"'))
+    log.write_text(log.read_text().replace("YawRate", "YawRate [deg/s]"))
+    assert cli.main(["map", "check", str(log), "--map", str(out)]) == 0
+    printed = capsys.readouterr()
+    assert set(said) <= {*printed.out.splitlines(), *printed.err.splitlines()}
+
+
 def test_a_drive_of_a_few_rows_is_too_short(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["map", "suggest", str(write_drive(tmp_path / "aim.csv", seconds=0.3))]) == 2
     assert ", of which none has 20 numbers at times of their own" in capsys.readouterr().err

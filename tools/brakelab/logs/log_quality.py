@@ -99,6 +99,8 @@ class SignalQuality(Damage):
     rows: int = 0
     samples: int = 0
     unknown_columns: list[str] = field(default_factory=list)
+    columns_twice: list[str] = field(default_factory=list)
+    """Of those that are read, by the name of the first."""
     zero_ns: int | None = None
     """Date of t = 0 as Unix time, if the file says so."""
     rows_twice: int = 0

@@ -1,9 +1,9 @@
 """Rows of a signal file on one clock and in its order: a clock that was set, rows from the end, rows twice.
 
 Time is a number, or the time of day as programs of measurement export it, `14:23:05,12` or `2:23:05 PM`
-with or without a date before it; at midnight a day is added. Where the clock was set back by more than a second, or on by more
-than an hour, and rows go on from there, time goes on as before it. Rows that stand in the file a second time
-are left out.
+with or without a date before it; at midnight a day is added. Where the clock was set back by more than a
+second, or on by more than an hour, and rows go on from there, time goes on as before it. Rows that stand in
+the file a second time are left out.
 """
 
 from collections.abc import Iterator

@@ -62,7 +62,7 @@ def columns_of(path: Path) -> Columns:
     if is_csv(path):
         header = find_header(path)
         units = dict(zip(header.names, header.units, strict=True))
-        titles = dict(zip(header.titles, header.names, strict=True))
+        titles = dict(zip(reversed(header.titles), reversed(header.names), strict=True))
         devices = [(name.partition("\\")[0], name) for name in header.names]  # INCA: signal\device:raster
         short = [name for name, _ in devices]
         titles |= {name: whole for name, whole in devices if short.count(name) == 1}
@@ -107,6 +107,7 @@ def time_of(path: Path, columns: Columns) -> tuple[str, float]:
 
 def rows_of(path: Path, columns: Columns, wanted: Sequence[str], quality: SignalQuality) -> Iterator[Batch]:
     """Yield the rows of a file, the columns `wanted` of it."""
+    quality.columns_twice = [name for name in wanted if f"{name}#2" in columns.names]
     if columns.header is not None:
         return _headed_csv_batches(path, columns.header, list(wanted), quality)
     if _is_mdf(path):

@@ -12,7 +12,6 @@ from rich.table import Table
 
 from brakelab.logs.column_map import read_column_map
 from brakelab.logs.formats import kind_of, read_frames
-from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.physics.samples import ANY_CAR, Car, car_of
 from brakelab.mapping.columns import column_map_text, read_column_series, with_lags
 from brakelab.mapping.drive_torque import motors
@@ -113,8 +112,10 @@ def _warnings(found: list[Found]) -> list[str]:
 
 def _suggest_columns(log: Path, out: Path | None, car: Car) -> None:
     """Propose a map of the columns of a signal file, as `suggest` does of frames."""
-    quality = SignalQuality()
-    columns, series = read_column_series(log, quality)
+    findings = Findings(log)
+    columns, series = read_column_series(log, findings.signals)
+    for line in damage_lines(findings):
+        say(line)
     found, motion = propose(series, car)
     if motion is None:
         among = f"no speed by its name and unit among {', '.join(columns.names[:SHOWN])}"

@@ -123,6 +123,10 @@ def damage_lines(findings: Findings) -> list[str]:
     if log.gaps:
         first = f"the longest of {log.gaps} gaps" if log.gaps > 1 else "the only gap"
         lines.append(f"{name}: {log.longest_gap}: no frame for {log.longest_gap_s:.1f} s before, {first}")
+    if signals.columns_twice:
+        these = ", ".join(signals.columns_twice[:SHOWN])
+        second = f"{signals.columns_twice[0]}#2"
+        lines.append(f'{name}: columns that stand twice: {these}; the first is read, "{second}" the second')
     if signals.unknown_columns:
         unknown = signals.unknown_columns
         more = f", … ({len(unknown)} in all)" if len(unknown) > SHOWN else ""
