@@ -156,6 +156,22 @@ def test_a_time_that_tells_no_rows_apart_is_refused(
     assert says in line
 
 
+def test_a_time_of_day_needs_no_unit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log, out = write_drive(tmp_path / "aim.csv"), tmp_path / "map.toml"
+    head, units, _, *rows = log.read_text().splitlines()
+    cells = [(float(t), rest) for t, rest in (row.split(",", 1) for row in rows)]
+    rows = [f"14:{23 + int(t / 60)}:{t % 60:06.3f},{rest}" for t, rest in cells]
+    log.write_text("\n".join([head, units.replace("s,", ",", 1), *rows, ""]))
+    assert cli.main(["map", "suggest", str(log), "--out", str(out)]) == 0
+    assert "time_unit" not in out.read_text("utf-8")
+    assert cli.main(["map", "check", str(log), "--map", str(out)]) == 0
+    log.write_text("\n".join([head.replace("Time", "Zeit in s"), units, *rows, ""]))
+    assert cli.main(["map", "suggest", str(log)]) == 2
+    assert 'BrakePress; give that of time such a name, its unit in brackets: "time [s]"' in (
+        capsys.readouterr().err
+    )
+
+
 def test_damage_and_columns_that_stand_twice_are_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -183,7 +183,8 @@ def time_column(
         return _found(content.time, where, "time", log, names, titles)
     found = [name for wanted in TIMES for name in names if name.strip().lower() == wanted]
     if not found:
-        remedy = f"missing; no column of {log} is called t, time or timestamp: {_shown(names)}"
+        there = f"no column of {log} is called t, time or timestamp: {_shown(names)}"
+        remedy = f'missing; {there}; give that of time such a name, its unit in brackets: "time [s]"'
         raise UserError(where, "time", remedy)
     return found[0]
 

@@ -1,5 +1,6 @@
 """Columns of a signal file as series, and the map of columns that is proposed from them."""
 
+from itertools import chain, islice
 from pathlib import Path
 from typing import Final
 
@@ -35,10 +36,11 @@ def read_column_series(log: Path, quality: SignalQuality) -> tuple[Columns, list
     time, seconds = time_of(log, columns)
     names = [name for name in columns.names if name != time]
     parts: dict[str, list[Vector]] = {name: [] for name in [time, *names]}
-    batches = in_order(log, rows_of(log, columns, [time, *names], quality), time, seconds, quality)
-    first = ""
+    rows = rows_of(log, columns, [time, *names], quality)
+    begin = [*islice(rows, 1)]
+    first = "".join(str(one) for batch in begin for one in batch.rows.column(time)[:1])
+    batches = in_order(log, chain(begin, rows), time, seconds, quality)
     for batch, _ in the_first(batches, lambda one: len(parts) * one.rows.num_rows):
-        first = first or "".join(map(str, batch.column(time)[:1]))
         for name, values in parts.items():
             values.append(numbers(batch.column(name)))
     read = {name: np.concatenate(parts.pop(name) or [np.empty(0)]) for name in [*parts]}
@@ -50,6 +52,8 @@ def read_column_series(log: Path, quality: SignalQuality) -> tuple[Columns, list
     check_seconds(log, time, known, f'; or write its unit behind the name, "{time} [us]"')
     refuse_one_instant(log, time, t, np.column_stack([read[name] for name in names]))
     t = t - known[0]
+    if ":" in first:
+        columns.units[time] = "hh:mm:ss"
     series = [_series(name, columns.units.get(name, ""), t, read[name]) for name in names]
     return columns, [one for one in series if len(one.t) >= FEWEST_FRAMES]
 
