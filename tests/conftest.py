@@ -44,8 +44,11 @@ if os.environ.get("BRAKE_ECU_TEST_LIBRARY") == "0":
         jit.library(package)
     del os.environ["BRAKE_ECU_LIBRARY"]
 
-LONG = re.compile(r"tests/(system/|test_|golden/|wide_world/|brakelab/(identify|fleet|report|studies)/)")
-"""Files whose tests run processes, trainings, studies or browsers."""
+LONG = re.compile(
+    r"tests/(system/|test_|golden/|wide_world/|closed_loop/|brakelab/(identify|fleet|report|studies)/"
+    r"|ecu/(test_|recording/test_store|algorithm/test_step_extremes))"
+)
+"""Files whose tests run processes, trainings, studies or browsers, compile much, or wait for a disk."""
 
 CHECKOUT = Path(__file__).parent.parent
 
