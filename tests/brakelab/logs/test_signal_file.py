@@ -115,6 +115,7 @@ DAMAGED = {
         {"t": [0.1, 0.0], "accel_x": [1.0, 2.0]},
         "row 1, t: time falls by 0.1 s to 0 s; sort the rows, or split the file",
     ),
+    "two rows exchanged": ("t,accel_x\n0,1\n.2,2\n.1,3\n.3,4\n", "line 4, t: time falls by 0.1 s to 0.1 s"),
     "a clock set back": ("t,accel_x\n11,1\n\n1,2\n", "line 4, t: time falls by 10 s to 1 s"),
     "UTF-16": (
         "\ufefft,accel_x\n0,1\n".encode("utf-16-le"),
@@ -180,12 +181,7 @@ MENDED: dict[str, tuple[Any, list[float], int, str]] = {
         1,
         "line 3 (3 cells instead of 2)",
     ),
-    "a quote that is never closed": (
-        't,accel_x\n0,1\n1,"2\n2,3\n',
-        [1, 3],
-        1,
-        "line 3 (1 cell instead of 2)",
-    ),
+    "a quote that never closes": ('t,accel_x\n0,1\n1,"2\n2,3\n', [1, 3], 1, "line 3 (1 cell instead of 2)"),
     "a line of 3 MB": ("t,accel_x\n0,1\n" + "7" * 3_000_000 + "\n2,3\n", [1, 3], 1, "line 3"),
     "a line of 3 MB at the end": ("t,accel_x\n0,1\n2,3\n" + "7" * 3_000_000, [1, 3], 1, "line 4"),
     "a last line that is cut off": ("t,accel_x\n0,1\n2,3\n3", [1, 3], 0, "line 4: the last line is cut off"),
@@ -193,6 +189,8 @@ MENDED: dict[str, tuple[Any, list[float], int, str]] = {
     "a line of units": ("t,accel_x\ns,m/s^2\n0,1\n2,3\n", [1, 3], 2, "line 2, t ('s' is no number)"),
     "semicolons and decimal commas": ("t;accel_x\n0,5;1,25\n1,5;-3,5\n", [1.25, -3.5], 0, ""),
     "tabs": ('"t"\t"accel_x"\r\n0.5\t"1.25"\r\n', [1.25], 0, ""),
+    "a digit lost": ("t,accel_x\n7.0,1\n7.1,2\n.2,3\n7.3,4\n", [1, 2, 4], 1, "line 4, t (does not fit"),
+    "a digit twice": ("t,accel_x\n7.0,1\n77.1,2\n7.2,3\n", [1, 3], 1, "line 3, t (does not fit"),
     "two samples at one instant": ("t,accel_x\n0,1\n0,2\n1,3\n", [1, 2, 3], 0, ""),
 }
 
@@ -276,6 +274,15 @@ CLOCKS: dict[str, tuple[list[float], int, str]] = {
     ),
     "seconds of a day, at midnight": ([(86_398.0 + 0.1 * k) % 86_400.0 for k in range(60)], 0, ""),
 }
+
+
+@pytest.mark.parametrize("block_rows", [2, 3, 4])
+def test_a_time_that_does_not_fit_is_found_between_two_blocks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block_rows: int
+) -> None:
+    monkeypatch.setattr(signal_batches, "BLOCK_ROWS", block_rows)
+    path = write(tmp_path / "drive.parquet", {"t": [0.0, 0.1, 0.2, 9.3, 0.4], "accel_x": [1.0] * 5})
+    assert sum(len(block.t_ns) for block in read_signals(path, SignalQuality())) == 4
 
 
 @pytest.mark.parametrize("clock", CLOCKS)

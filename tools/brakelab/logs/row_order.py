@@ -3,7 +3,7 @@
 Time is a number, or the time of day as programs of measurement export it, `14:23:05,12` or `2:23:05 PM`
 with or without a date before it; at midnight a day is added. Where the clock was set back by more than a
 second, or on by more than an hour, and rows go on from there, time goes on as before it. Rows that stand in
-the file a second time are left out.
+the file a second time are left out, and a row whose time alone does not fit between those beside it.
 """
 
 from collections.abc import Iterator
@@ -128,8 +128,17 @@ def _on_one_clock(
     column = batch.rows.column(time)
     every = numbers(column) * seconds
     known = np.flatnonzero(np.isfinite(every))
+    ahead = ahead[np.isfinite(ahead)]
+    strays = known[_strays(np.concatenate([[clock.last_s], every[known], ahead]), len(known))]
+    if len(strays):
+        place = place_of(path, batch.places[strays[0]])
+        quality.note_damage(len(strays), f"{place}, {time} (does not fit between the rows beside it)")
+        kept = np.ones(len(every), np.bool_)
+        kept[strays] = False
+        batch = Batch(batch.rows.filter(arrow_array(kept, pa.bool_())), batch.places[kept])
+        return _on_one_clock(path, batch, time, seconds, ahead, clock, quality)
     t = every[known]
-    steps = np.diff(np.concatenate([t, ahead[np.isfinite(ahead)]]), prepend=clock.last_s)
+    steps = np.diff(np.concatenate([t, ahead]), prepend=clock.last_s)
     shift, again = np.full(len(t), clock.shift_s), np.zeros(len(t), np.bool_)
     if clock.again:
         again[: _beyond(t, clock)] = True
@@ -161,6 +170,15 @@ def _on_one_clock(
     kept = np.ones(len(every), np.bool_)
     kept[known[again]] = False
     return Batch(rows.filter(arrow_array(kept, pa.bool_())), batch.places[kept])
+
+
+def _strays(t: NDArray[np.float64], count: int) -> NDArray[np.bool_]:
+    """Return which of `count` times after the first do not fit between those beside them, which do."""
+    before, here, behind = t[:-2], t[1:-1], t[2:]
+    outside = np.zeros(len(t), np.bool_)
+    outside[1:-1] = (before <= behind) & ((here < before) | (here > behind))
+    alone = outside[1:-1] & ~outside[:-2] & ~outside[2:]
+    return np.concatenate([alone, np.zeros(count, np.bool_)])[:count]
 
 
 def _is_clock(column: "pa.Array[Any]", t: NDArray[np.float64]) -> bool:
