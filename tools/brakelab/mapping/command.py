@@ -113,10 +113,11 @@ def _warnings(found: list[Found]) -> list[str]:
 def _suggest_columns(log: Path, out: Path | None, car: Car) -> None:
     """Propose a map of the columns of a signal file, as `suggest` does of frames."""
     findings = Findings(log)
-    columns, series = read_column_series(log, findings.signals)
+    with progress_bar("map suggest", None):
+        columns, series = read_column_series(log, findings.signals)
+        found, motion = propose(series, car)
     for line in damage_lines(findings):
         say(line)
-    found, motion = propose(series, car)
     if motion is None:
         among = f"no speed by its name and unit among {', '.join(columns.names[:SHOWN])}"
         if not series:
