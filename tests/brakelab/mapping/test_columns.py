@@ -199,6 +199,12 @@ def test_a_drive_of_a_few_rows_is_too_short(tmp_path: Path, capsys: pytest.Captu
     assert ", of which none has 20 numbers at times of their own" in capsys.readouterr().err
 
 
+def test_time_alone_is_no_drive(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pd.DataFrame({"t": [0.0, 0.1, 0.2]}).to_parquet(tmp_path / "drive.parquet")
+    assert cli.main(["map", "suggest", str(tmp_path / "drive.parquet")]) == 2
+    assert "no speed by its name and unit among t, of which none" in capsys.readouterr().err
+
+
 def test_wheel_speeds_without_a_unit_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """28 m/s at most: 102 km/h; all else is judged by the wheels."""
     log = write_drive(tmp_path / "aim.csv", seconds=40.0)

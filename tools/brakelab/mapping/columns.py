@@ -50,7 +50,7 @@ def read_column_series(log: Path, quality: SignalQuality) -> tuple[Columns, list
         raise UserError(str(log), time, remedy if len(t) else "holds no time; give a file with rows")
     known = t[np.isfinite(t)]
     check_seconds(log, time, known, f'; or write its unit behind the name, "{time} [us]"')
-    refuse_one_instant(log, time, t, np.column_stack([read[name] for name in names]))
+    refuse_one_instant(log, time, t, np.column_stack([t, *(read[name] for name in names)]))
     t = t - known[0]
     if ":" in first:
         columns.units[time] = "hh:mm:ss"
