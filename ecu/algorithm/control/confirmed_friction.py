@@ -27,7 +27,7 @@ until any was confirmed c is not known, and no rise is followed.
 import numpy as np
 
 from ecu.algorithm.lag import lag_gain
-from ecu.algorithm.monitoring.acceleration import rolled_accel
+from ecu.algorithm.monitoring.accel_blocks import rolled_accel
 from ecu.algorithm.vehicle import tyre_slip
 from ecu.contract.params import GRAVITY
 from ecu.jit import Record, kernel

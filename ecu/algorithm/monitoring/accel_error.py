@@ -3,11 +3,11 @@
     a - dw/dt = c + s dw/dt      c: zero and slope of the road, walks by `SLOPE_WALK`; s: scale error
     a - f     = b + k f          b: zero; k: scale error, while no brake is applied and the motors alone drive
 
-of the blocks of 0.1 s that `acceleration.py` gathers. Each is a Kalman filter of two states: a slope does not
-come and go with the force. Errors of mass, motors, drag and pitch are in them from the start, so what counts
-is what they have moved by from what is usual. That of the torques is a slow filter of the same blocks, which
-learns none that has moved by half of the tolerance; it is as uncertain as the present force is unlike those
-seen. That of the wheels is a mean, whose scale stands still where it has moved by half of `SCALE_DOUBT`.
+of the blocks of `accel_blocks.py`. Each is a Kalman filter of two states: a slope does not come and go with
+the force. Errors of mass, motors, drag and pitch are in them from the start, so what counts is what they have
+moved by from what is usual. That of the torques is a slow filter of the same blocks, which learns none that
+has moved by half of the tolerance; it is as uncertain as the present force is unlike those seen. That of the
+wheels is a mean, whose scale stands still where it has moved by half of `SCALE_DOUBT`.
 
 A zero moves b and c alike, a scale k and s: what has moved in both is taken off the reading, once the forces
 seen tell a zero from a scale. A c without b is a slope; a b without c is no zero of the accelerometer
@@ -25,8 +25,8 @@ import math
 
 import numpy as np
 
+from ecu.algorithm.monitoring.accel_blocks import BLOCK_S, ROLLED, SHOWN, A, F, W
 from ecu.algorithm.monitoring.accel_timing import ACCEL_TIMING_STATE
-from ecu.algorithm.monitoring.acceleration import BLOCK_S, ROLLED, SHOWN, A, F, W
 from ecu.algorithm.monitoring.error_line import (
     LINE_STATE,
     SCALE_MOST,

@@ -5,7 +5,7 @@ late     where the force of linings and motors has changed and is steady again, 
 
     L = sum over 1.2 s of ((f - f_0) / (f_1 - f_0) - (a - a_0) / (a_1 - a_0)) 0.1 s
 
-of the blocks of `acceleration.py`, 0 before and 1 after the change. Each is over its own change, so neither
+of the blocks of `accel_blocks.py`, 0 before and 1 after the change. Each is over its own change, so neither
 friction, mass, slope nor the reading's zero and scale are in it; tyres and pitch take up to 0.045 s (all
 simulated cars). A reading that is late seems to be a lining that rubs less as the brakes come, and more as
 they go, and motors that give what they do not: these are believed again. It is left out until it is in time.
@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from ecu.algorithm.inputs import fresh
-from ecu.algorithm.monitoring.acceleration import BLOCK_S, BLOCKS, ROLLED, A, F
+from ecu.algorithm.monitoring.accel_blocks import BLOCK_S, BLOCKS, ROLLED, A, F
 from ecu.algorithm.monitoring.witness import believe, compare
 from ecu.contract.signals import ACCEL_X, MOTOR_TORQUE
 from ecu.jit import Record, kernel

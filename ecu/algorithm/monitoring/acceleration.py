@@ -29,27 +29,29 @@ Assumption: all constants; found with the simulated vehicle, whose sound sensor 
 `LEAST_ERROR` in all shipped scenarios.
 """
 
-import math
-
 import numpy as np
 
-from ecu.algorithm.inputs import (
-    driver_accelerates,
-    fresh,
-    motor_torque,
-    motor_torque_known,
-    others_brake,
-    usable,
+from ecu.algorithm.inputs import driver_accelerates, motor_torque_known, others_brake, usable
+from ecu.algorithm.monitoring.accel_blocks import (
+    BLOCK_S,
+    BLOCKS,
+    KINDS,
+    ROLLED,
+    SHOWN,
+    A,
+    F,
+    W,
+    before,
+    close_block,
+    force_moved,
+    gather_block,
+    now,
+    wheels_accel,
 )
 from ecu.algorithm.monitoring.witness import compare, compare_both
-from ecu.algorithm.vehicle import tyre_slip
-from ecu.contract.params import GRAVITY
 from ecu.contract.signals import ACCEL_X, CALLIPER_PRESSURE, MOTOR_TORQUE, REVERSE, WHEEL_SPEED
 from ecu.jit import Record, kernel
 
-A, W, F, ROLLED = range(4)
-KINDS = 4
-BLOCKS = 12
 ACCELERATION_STATE = np.dtype(
     [
         ("time", "f8"),  # of the block that is gathered [s]
@@ -77,22 +79,19 @@ ACCELERATION_STATE = np.dtype(
     align=True,
 )
 
-BLOCK_S = 0.1
-LONGEST_BLOCK_S = 0.125  # cycles were missed
 OLDEST_S = 0.06  # of a reading
 LEAST_SPEED = 3.0  # m/s
 ROLLING = 0.06  # of the speed, greatest difference of a rolling wheel
 LEAST_ERROR, NOISE = 0.25, 6.0  # m/s^2, times sigma
-SLIP, SLIP_BY_SPEED = 0.1, 0.01  # -, s/m
 FORCE = 0.3  # possible error of friction
 KNOWN_MOTORS = 0.1  # greatest relative error of a motor torque that still yields a force
 SLOPE, STEEP = 2.0, 1.5  # m/s^2, of a slope of 20 %, of 15 %
 DENIED = 1.0  # m/s^2
 SECOND, OPPOSED = 10, 3  # blocks
-SHOWN = 0.5  # of the acceleration at which it jumped: a scale shows at no lesser one
 AGAIN, AGREED = 0.5, 2  # of LEAST_ERROR; blocks after the first time, twice as many after each further
 OFTEN = 6
 STANDSTILL = 0.1  # m/s
+COMPARED = 4  # blocks of which the reading and dv/dt are, and the one before
 
 
 @kernel
@@ -126,75 +125,9 @@ def _drive_known(params: Record, inputs: Record) -> bool:
 
 
 @kernel
-def _gather(
-    params: Record,
-    state: Record,
-    inputs: Record,
-    estimate: Record,
-    base: Record,
-    braking: bool,
-) -> None:
-    value = inputs.value
-    force, wheels = 0.0, 0.0
-    for i in range(4):
-        radius = params.wheel_radius[i]
-        lining = estimate.brake_torque[i] * base[i] / estimate.mu[i] if braking else 0.0
-        force -= (lining + motor_torque(inputs, i)) / (radius * params.mass)
-        wheels += 0.25 * value[WHEEL_SPEED + i] * radius
-    reading = value[ACCEL_X] / (1.0 + GRAVITY * params.pitch_gradient)
-    state.sum[A] += reading + estimate.yaw_rate * estimate.lateral_speed
-    state.sum[W] += wheels * (1.0 + tyre_slip(params, reading))
-    state.sum[F] += force
-    state.sum[ROLLED] += wheels
-    state.readings += 1 if fresh(inputs, ACCEL_X) else 0
-    state.cycles += 1
-
-
-@kernel
-def _close_block(params: Record, state: Record) -> None:
-    turns = 0.5 * params.wheel_radius[0] * params.sigma_wheel_speed
-    variance = 0.6 * params.sigma_accel**2 + 2.0 * (turns / (2.0 * BLOCK_S)) ** 2
-    state.sigma = math.sqrt(variance / max(state.readings, 1))
-    for k in range(BLOCKS - 1, 0, -1):
-        for j in range(KINDS):
-            state.mean[k, j] = state.mean[k - 1, j]
-    for j in range(KINDS):
-        state.mean[0, j] = state.sum[j] / state.cycles
-        state.sum[j] = 0.0
-    sound = state.good != 0 and state.time < LONGEST_BLOCK_S
-    state.good_blocks = state.good_blocks + 1 if sound else 0
-    state.known_blocks = state.known_blocks + 1 if sound and state.known else 0
-    state.compared_blocks = state.compared_blocks + 1 if sound and state.known else 0
-    state.time, state.cycles, state.readings, state.good, state.known = 0.0, 0, 0, 1, 1
-
-
-@kernel
-def _now(mean: Record, j: int) -> float:
-    return (mean[0, j] + mean[1, j] + mean[2, j]) / 3.0
-
-
-@kernel
-def _before(mean: Record, j: int) -> float:
-    return 0.25 * (mean[4, j] + mean[5, j] + mean[6, j] + mean[7, j])
-
-
-@kernel
-def _wheels_accel(mean: Record, j: int) -> float:
-    """Return dv/dt now, v in column `j` [m/s^2]."""
-    return (mean[0, j] - mean[2, j]) / (2.0 * BLOCK_S)
-
-
-@kernel
-def rolled_accel(state: Record) -> float:
-    """Return d(omega r)/dt over the last blocks, of all wheels [m/s^2]; 0 without two of them."""
-    mean = state.mean
-    return float((mean[0, ROLLED] - mean[2, ROLLED]) / (2.0 * BLOCK_S))
-
-
-@kernel
 def _beside_wheels(mean: Record, j: int) -> float:
     """Return a - dv/dt now, v in column `j` [m/s^2]."""
-    return _now(mean, A) - _wheels_accel(mean, j)
+    return now(mean, A) - wheels_accel(mean, j)
 
 
 @kernel
@@ -207,7 +140,7 @@ def wheels_deny(state: Record) -> bool:
 def _usually_beside_wheels(mean: Record, j: int) -> float:
     """Return a - dv/dt before, of a straight line through four blocks [m/s^2]."""
     change = (3.0 * (mean[4, j] - mean[7, j]) + mean[5, j] - mean[6, j]) / (10.0 * BLOCK_S)
-    return _before(mean, A) - change
+    return before(mean, A) - change
 
 
 @kernel
@@ -229,27 +162,25 @@ def _agrees(state: Record, witness: Record) -> bool:
     if state.known_blocks < 3:
         on_a_road: bool = compare(witness, ACCEL_X, against_wheels, SLOPE) < 1.0
         return on_a_road and state.good_blocks >= SECOND
-    if abs(_wheels_accel(mean, W)) < SHOWN * state.shown_at:
+    if abs(wheels_accel(mean, W)) < SHOWN * state.shown_at:
         return False
-    against_force = _now(mean, A) - _now(mean, F)
-    unsure = FORCE * max(-_now(mean, F), 0.0)
+    against_force = now(mean, A) - now(mean, F)
+    unsure = FORCE * max(-now(mean, F), 0.0)
     by_force = state.known_blocks >= SECOND and abs(against_force - state.usual_force) + unsure < least
     by_wheels: bool = compare(witness, ACCEL_X, against_wheels - state.usual, least) < 1.0
-    return by_force or by_wheels or abs(against_wheels - state.usual_slope) < least
+    apart = abs(against_wheels - (state.usual if by_wheels else state.usual_slope))
+    return by_force or apart + force_moved(mean, COMPARED)[1] < least
 
 
 @kernel
 def _jumped(state: Record, witness: Record) -> bool:
     """Return whether the reading has moved against wheels and torques."""
     mean = state.mean
-    least, greatest = mean[0, F], mean[0, F]
-    for k in range(1, BLOCKS):
-        least, greatest = min(least, mean[k, F]), max(greatest, mean[k, F])
-    moved = greatest - least
+    moved, slip = force_moved(mean, BLOCKS)
     wheels = _moved_against_wheels(mean)
-    force = _now(mean, A) - _now(mean, F) - (_before(mean, A) - _before(mean, F))
+    force = now(mean, A) - now(mean, F) - (before(mean, A) - before(mean, F))
     noise = max(LEAST_ERROR, NOISE * state.sigma)
-    wheels_err = noise + (SLIP + SLIP_BY_SPEED * _now(mean, W)) * moved
+    wheels_err = noise + slip
     force_err = noise + FORCE * moved
     compare_both(witness, ACCEL_X, wheels, wheels_err, force, force_err)
     up: bool = wheels > wheels_err and force > force_err
@@ -263,8 +194,8 @@ def _beyond_any_road(state: Record, witness: Record) -> bool:
     if state.known_blocks < 8:
         beyond: bool = compare(witness, ACCEL_X, against_wheels, SLOPE + NOISE * state.sigma) > 1.0
         return beyond
-    against_force = _now(mean, A) - _now(mean, F)
-    denied = DENIED + FORCE * abs(_now(mean, F))
+    against_force = now(mean, A) - now(mean, F)
+    denied = DENIED + FORCE * abs(now(mean, F))
     compare_both(witness, ACCEL_X, against_wheels, SLOPE, against_force, denied)
     up: bool = against_wheels > SLOPE and against_force > denied
     return up or (against_wheels < -SLOPE and against_force < -denied)
@@ -302,9 +233,9 @@ def _judge(state: Record, witness: Record, slope: float, slowed: bool) -> None:
     if jumped or state.beyond >= SECOND or state.opposed >= OPPOSED:
         state.implausible, state.agreed, state.times = 1, 0, min(state.times + 1, OFTEN)
         state.usual_slope = slope
-        state.shown_at = abs(_wheels_accel(mean, W)) if jumped else 0.0
+        state.shown_at = abs(wheels_accel(mean, W)) if jumped else 0.0
         state.usual = _usually_beside_wheels(mean, W) if jumped else 0.0
-        state.usual_force = _before(mean, A) - _before(mean, F) if jumped else 0.0
+        state.usual_force = before(mean, A) - before(mean, F) if jumped else 0.0
 
 
 @kernel
@@ -338,12 +269,11 @@ def watch_acceleration(
         state.good = 0
     if not _drive_known(params, inputs):
         state.known = 0
-    _gather(params, state, inputs, estimate, base, braking)
+    gather_block(params, state, inputs, estimate, base, braking)
     state.time += dt
     if state.time > BLOCK_S - 0.001:
-        _close_block(params, state)
+        close_block(params, state)
         if witness.rejected[ACCEL_X]:
-            state.implausible = 0  # as a whole: it has a name
             return
         reverses = estimate.backwards or inputs.value[REVERSE] > 0.5
         _judge(state, witness, slope, braking and not (reverses or driver_accelerates(inputs)))

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.monitoring.acceleration import BLOCK_S
+from ecu.algorithm.monitoring.accel_blocks import BLOCK_S
 from ecu.jit import Record, kernel
 
 _FIT = np.dtype(

@@ -21,6 +21,7 @@ import numpy as np
 
 from ecu.algorithm.inputs import driver_accelerates, motor_torque, motor_torque_known, others_brake, usable
 from ecu.algorithm.lag import lag_gain
+from ecu.algorithm.monitoring.accel_blocks import BLOCK_S
 from ecu.algorithm.monitoring.accel_error import (
     USUAL,
     accel_doubted,
@@ -28,7 +29,7 @@ from ecu.algorithm.monitoring.accel_error import (
     usual_known,
     wheels_confirm,
 )
-from ecu.algorithm.monitoring.acceleration import BLOCK_S, KNOWN_MOTORS
+from ecu.algorithm.monitoring.acceleration import KNOWN_MOTORS
 from ecu.algorithm.monitoring.error_line import moved_offset
 from ecu.algorithm.monitoring.witness import AGAIN_S, FASTEST_DOUBT, believe, compare, judge
 from ecu.contract.params import GRAVITY

@@ -8,7 +8,8 @@ import pytest
 from ecu.algorithm.control.confirmed_friction import confirm_friction
 from ecu.algorithm.control.pressure_law import PRESSURE_LAW_STATE, follow_friction, set_base
 from ecu.algorithm.estimate import ESTIMATE
-from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE, BLOCK_S, ROLLED
+from ecu.algorithm.monitoring.accel_blocks import BLOCK_S, ROLLED
+from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE
 from ecu.algorithm.vehicle import tyre_slip
 from ecu.contract.params import GRAVITY
 from ecu.contract.records import LEARNED

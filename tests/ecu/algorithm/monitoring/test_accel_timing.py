@@ -6,8 +6,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from ecu.algorithm.monitoring.accel_blocks import ROLLED, A, F
 from ecu.algorithm.monitoring.accel_timing import ACCEL_TIMING_STATE, watch_timing
-from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE, ROLLED, A, F
+from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE
 from ecu.algorithm.monitoring.witness import WITNESS_STATE
 from ecu.contract.signals import ACCEL_X, MOTOR_TORQUE
 

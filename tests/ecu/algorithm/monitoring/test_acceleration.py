@@ -15,7 +15,7 @@ from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE, watch_acce
 from ecu.algorithm.monitoring.witness import WITNESS_STATE
 from ecu.contract.params import GRAVITY
 from ecu.contract.records import RecordArray
-from ecu.contract.signals import MOTOR_TORQUE
+from ecu.contract.signals import ACCEL_X, MOTOR_TORQUE
 
 JUMP = 3.0  # s
 Series = Callable[[float], float]
@@ -29,6 +29,11 @@ def braked(t: float) -> float:
 def begins(t: float) -> float:
     """4 m/s^2 within 0.3 s."""
     return -4.0 * min(max((t - JUMP) / 0.3, 0.0), 1.0)
+
+
+def lets_go(t: float) -> float:
+    """2.5 m/s^2 forwards, and nothing within 0.2 s."""
+    return 2.5 * min(max(1.0 - (t - JUMP - 0.5) / 0.2, 0.0), 1.0)
 
 
 def steps(height: float, since: float = JUMP, until: float = 99.0) -> Series:
@@ -78,11 +83,13 @@ def drive(
     seconds: float = 6.0,
     motors: bool = True,
     slope: float = 0.0,
+    named_until: float = 0.0,
     **disturbed: Any,
 ) -> list[bool]:
     """Return in which cycles the reading was implausible.
 
-    `motors`: their torque is reported; `slope` [m/s^2]: as it is known; `disturbed`: inputs from `JUMP` on.
+    `motors`: their torque is reported; `slope` [m/s^2]: as it is known; `named_until` [s]: it is left out by
+    its name from half a second after `JUMP` on; `disturbed`: inputs from `JUMP` on.
     """
     rng = np.random.default_rng(7)
     p = params[0]
@@ -103,6 +110,7 @@ def drive(
         if not motors:
             inputs[0]["verdict"][MOTOR_TORQUE : MOTOR_TORQUE + 4] = 0
         estimate["speed"] = speed
+        witness["rejected"][ACCEL_X] = JUMP + 0.5 < t < named_until
         watch_acceleration(p, state, witness, inputs[0], estimate, base, slope, False, 0.01)
         said.append(bool(state["implausible"]))
     return said
@@ -142,6 +150,7 @@ def test_a_reading_is_believed_again_on_the_slope_that_was_known(params, feed, s
 STILL_WRONG = [
     pytest.param(lambda t: -4.0 if t < 5.0 else 0.0, none, steps(0.8, JUMP, 5.0), id="a scale, rolling"),
     pytest.param(lambda t: -4.0, steps(-0.8, 5.0), steps(0.8), id="a zero, linings rub more"),
+    pytest.param(lets_go, none, lambda t: 0.2 * lets_go(t) * (t >= JUMP), id="a scale, as motors let go"),
 ]
 
 
@@ -151,6 +160,11 @@ def test_a_reading_that_is_still_wrong_is_not_believed(
 ) -> None:
     """A scale shows at no lesser deceleration; linings are no witness, for their friction changes."""
     said = drive(params, feed, force, car, none, reading)
+    assert all(said[round(100 * JUMP) + 40 :])
+
+
+def test_one_that_jumped_and_was_late_is_not_believed_because_it_is_in_time(params, feed) -> None:
+    said = drive(params, feed, braked, none, none, steps(0.5), named_until=JUMP + 1.5)
     assert all(said[round(100 * JUMP) + 40 :])
 
 

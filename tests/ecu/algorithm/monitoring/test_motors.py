@@ -5,8 +5,9 @@ import pytest
 
 from ecu.algorithm.control.blending import BLENDING_STATE
 from ecu.algorithm.estimate import ESTIMATE
+from ecu.algorithm.monitoring.accel_blocks import BLOCK_S
 from ecu.algorithm.monitoring.accel_error import ACCEL_ERROR_STATE, APART_S
-from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE, BLOCK_S
+from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE
 from ecu.algorithm.monitoring.motors import (
     ACCEL,
     DRIVES_ON,
