@@ -14,6 +14,7 @@ import math
 
 import numpy as np
 
+from ecu.algorithm.estimate import STANDING
 from ecu.algorithm.inputs import MAX_DECEL, driver_accelerates, fresh, motor_torque, usable
 from ecu.algorithm.monitoring.witness import believe, compare
 from ecu.contract.signals import ACCEL_X, REVERSE, VEHICLE_SPEED, WHEEL_SPEED
@@ -125,9 +126,10 @@ def _brakes_slow(params: Record, inputs: Record, estimate: Record) -> bool:
 
 @kernel
 def _turned(params: Record, inputs: Record, estimate: Record) -> bool:
-    turned = estimate.speed > FORWARDS or _brakes_slow(params, inputs, estimate)
+    slow = _brakes_slow(params, inputs, estimate)
+    turned, least = estimate.speed > FORWARDS or slow, STANDING if slow else BACKWARDS
     for i in range(4):
-        turned = turned and inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i] < -BACKWARDS
+        turned = turned and inputs.value[WHEEL_SPEED + i] * params.wheel_radius[i] < -least
     return turned
 
 

@@ -165,3 +165,14 @@ def test_all_turn_backwards_while_the_brakes_are_applied(
     unit.witness["rejected"][VEHICLE_SPEED] = 1
     assert unit.read(unit.omega, torque, accel, dt=1.0, **signals) == rejected, case
     assert unit.witness["rejected"][VEHICLE_SPEED] == (not rejected), case
+
+
+@pytest.mark.parametrize(
+    ("back", "accel", "rejected"), [(0.4, -3.0, True), (0.2, -3.0, False), (0.4, 0.0, False)]
+)
+def test_wheels_that_turn_backwards_turn_no_car_that_the_brakes_slow(
+    params, feed, back, accel, rejected
+) -> None:
+    """From the speed on at which the car counts as one that rolls back; one that has stopped rocks."""
+    unit = Unit(params, feed, 0.0)
+    assert unit.read(-back / unit.params["wheel_radius"], BRAKE, accel, dt=1.0) == rejected
