@@ -310,8 +310,8 @@ def _control(p: Record, s: Record, u: Record, dt: float) -> float:
     if p.minimised:
         straight, share = calm and abs(e.accel_y) <= CALM_ACROSS, front_share(p, decel)
         lean(p, s.cleaner, torque, allowed, s.discs.temperature, share, e.mass, decel, straight, dt)
-    slow, offset = slowness(p, s.hydraulics), s.accel_error.wheels.now.offset
-    confirm_friction(p, s.control.confirmed, e, s.control.used, offset, s.acceleration, decel, calm, slow, dt)
+    slow, line = slowness(p, s.hydraulics), s.accel_error.wheels
+    confirm_friction(p, s.control.confirmed, e, s.control.used, line, s.acceleration, decel, calm, slow, dt)
     follow_friction(p, s.control, e, dt)
     advance_pressures(p, s.hydraulics, s.limiter.pressure)
     update_motors(p, s.blending, u, s.guard.capped, e.speed, decel, slow, dt)

@@ -14,10 +14,10 @@ Until a friction was confirmed, all of a rise is one over the base, and more tha
 will be once hydraulics and car have followed what is taken back already is predicted (a Smith predictor, with
 their lag as a model), and counts: without it twice of what is missing was given, and wheels locked.
 
-d is what the accelerometer has moved by against the wheels of late (c of `accel_error.py`): a drift, or the
-road. A negative d counts against a rise: two witnesses, accelerometer and wheels, must confirm what lowers
-the pressure. A positive one counts where friction is lowered beyond what was confirmed. On a road that falls
-away a true rise waits until d is usual, and the car brakes the harder for it.
+d is what the accelerometer has moved by against the wheels of late, at their deceleration (c and s of
+`accel_error.py`): a drift, or the road. A negative d counts against a rise: two witnesses, accelerometer and
+wheels, must confirm what lowers the pressure. A positive one counts where friction is lowered beyond what was
+confirmed. On a road that falls away a true rise waits until d is usual, and the car brakes the harder for it.
 
 While the accelerometer is left out, the wheels' deceleration stands for a, less the slope of before, c, where
 that counts against a rise. What was taken below the confirmed friction on its word is given again at once;
@@ -28,6 +28,7 @@ import numpy as np
 
 from ecu.algorithm.lag import lag_gain
 from ecu.algorithm.monitoring.accel_blocks import rolled_accel
+from ecu.algorithm.monitoring.error_line import moved_scale
 from ecu.algorithm.vehicle import tyre_slip
 from ecu.contract.params import GRAVITY
 from ecu.jit import Record, kernel
@@ -68,7 +69,7 @@ def confirm_friction(
     state: Record,
     estimate: Record,
     used: Record,
-    accel_offset: float,
+    line: Record,
     blocks: Record,
     decel: float,
     calm: bool,
@@ -82,7 +83,7 @@ def confirm_friction(
         state: `CONFIRMED_STATE`, overwritten.
         estimate: `ESTIMATE` of this cycle.
         used: friction in use, shape (4,).
-        accel_offset: c, the accelerometer's difference from the wheels [m/s^2].
+        line: `LINE_STATE`, what the accelerometer differs from the wheels by.
         blocks: `ACCELERATION_STATE`, for the acceleration of the wheels.
         decel: demanded [m/s^2], NaN: unknown.
         calm: the ECU alone brakes, forwards, no wheel or axle is held back and no brake has failed.
@@ -90,12 +91,12 @@ def confirm_friction(
         dt: time since the last cycle [s].
     """
     state.excess, measured, known = 0.0, estimate.measured != 0, state.friction[0] > 0.0
-    accel, drifted = estimate.accel_x, accel_offset - state.usual
+    rolled, offset = rolled_accel(blocks), line.now.offset
+    accel, drifted = estimate.accel_x, offset + moved_scale(line) * min(rolled, 0.0) - state.usual
     if not measured:
-        rolled = rolled_accel(blocks)
         accel, drifted = rolled * (1.0 + tyre_slip(params, rolled)) + max(state.usual, 0.0), 0.0
     else:
-        state.usual += (accel_offset - state.usual) * min(dt / USUAL_S, 1.0)
+        state.usual += (offset - state.usual) * min(dt / USUAL_S, 1.0)
     if not decel > LEAST_DECEL:
         state.asked = state.given = state.steady_s = 0.0
         state.pressed = state.followed = 1.0
@@ -132,7 +133,7 @@ def confirm_friction(
         state.back = max(state.back - (GIVE_FAST if coming > OVER else GIVE) * dt, 0.0)
     if state.back == 0.0 and state.excess == 0.0 and share > CONFIRMS:
         if not known:
-            state.usual = accel_offset  # of the road that the first braking was on
+            state.usual = offset  # of the road that the first braking was on
         for i in range(4):
             state.friction[i] += (used[i] - state.friction[i]) * (dt / FOLLOW_S if known else 1.0)
 

@@ -10,6 +10,7 @@ from ecu.algorithm.control.pressure_law import PRESSURE_LAW_STATE, follow_fricti
 from ecu.algorithm.estimate import ESTIMATE
 from ecu.algorithm.monitoring.accel_blocks import BLOCK_S, ROLLED
 from ecu.algorithm.monitoring.acceleration import ACCELERATION_STATE
+from ecu.algorithm.monitoring.error_line import LINE_STATE
 from ecu.algorithm.vehicle import tyre_slip
 from ecu.contract.params import GRAVITY
 from ecu.contract.records import LEARNED
@@ -27,7 +28,7 @@ class Car:
         self.law["mu_override"], self.law["start"] = math.nan, 1.0
         self.estimate = np.zeros(1, ESTIMATE)[0]
         self.estimate["sigma"], self.estimate["observed_s"], self.estimate["measured"] = 0.01, 2.0, 1
-        self.blocks = np.zeros(1, ACCELERATION_STATE)[0]
+        self.blocks, self.line = np.zeros(1, ACCELERATION_STATE)[0], np.zeros(1, LINE_STATE)[0]
         self.force = self.most = 0.0
 
     @property
@@ -41,6 +42,7 @@ class Car:
         true=MU,
         reads=0.0,
         offset=0.0,
+        scale=0.0,
         decel=DECEL,
         calm=True,
         speed=20.0,
@@ -48,9 +50,11 @@ class Car:
     ):
         """Return the least force over demand.
 
-        `reads`: error of the accelerometer, `offset`: c, `slope`: what gravity adds to dv/dt [m/s^2].
+        `reads`: error of the accelerometer, `offset`: c, `scale`: s, `slope`: what gravity adds
+        to dv/dt [m/s^2].
         """
         least = math.inf
+        self.line["now"]["offset"], self.line["now"]["scale"] = offset, scale
         self.estimate["mu"], self.estimate["speed"] = believed, speed
         resistance = self.p["drag_area"] * speed**2 / self.p["mass"] + self.p["rolling_resistance"] * GRAVITY
         for _ in range(round(seconds / DT)):
@@ -61,7 +65,7 @@ class Car:
             rolled = (slope - slows) / (1.0 + tyre_slip(self.p, slope - slows))
             self.blocks["mean"][:3, ROLLED] = 20.0, 20.0 - BLOCK_S * rolled, 20.0 - 2.0 * BLOCK_S * rolled
             confirm_friction(
-                self.p, self.state, self.estimate, self.law["used"], offset, self.blocks, decel, calm,
+                self.p, self.state, self.estimate, self.law["used"], self.line, self.blocks, decel, calm,
                 self.slowness, DT,
             )  # fmt: skip
             follow_friction(self.p, self.law, self.estimate, DT)
@@ -95,6 +99,19 @@ CASES = [
         {"believed": 1.15 * MU, "reads": -0.6, "offset": -0.6},
         1.0,
         1.06,
+    ),
+    (
+        "it rises by one whose scale the wheels deny",
+        {"believed": 1.15 * MU, "reads": -0.6, "scale": 0.15},
+        1.0,
+        1.06,
+    ),
+    ("a scale as usual", {"believed": 1.15 * MU, "true": 1.15 * MU, "scale": 0.02}, 1.15, 1.15),
+    (
+        "it reads less by a scale: no less friction than confirmed",
+        {"believed": MU, "reads": 0.6, "scale": -0.15},
+        1.0,
+        1.0,
     ),
     (
         "the linings rub less on a road that falls away",
