@@ -12,10 +12,12 @@ functions do (ECE R13-H, Annex 5: the rear uses no more grip than the front):
   `rear_slip_margin`, and by the car's speed `LEAST_SLIP` more than tyres do at the deceleration measured,
   torque of the rear axle moves to the front one until it no longer does. A front wheel counts as no faster
   than the ground: one whose speed is late or scaled alone takes nothing. One that the slip guard holds is no
-  measure: just cut, it slips less than it can. This needs no friction estimate. A wheel that slips as before
-  `DENIED_S` after its axle was relieved does not slip: what it reads less, and slowly less in this braking,
-  is taken for its radius. Beside a front wheel whose brake has failed it may slip `LONE_SLIP`. The front
-  takes all of it up to `GRIP` of its load, beyond that slowly; none from when it slips more than `GRIP_SLIP`.
+  measure: just cut, it slips less than it can. Of one whose axle gives back what it took, what it slipped
+  then counts for `FOLLOWS_S`. This needs no friction estimate. A wheel that slips as before `DENIED_S` after
+  its axle was relieved does not slip: what it reads less, and slowly less in this braking, is taken for its
+  radius; nor does the other one, as long as it reads no less (one frame has both). Beside a front wheel whose
+  brake has failed it may slip `LONE_SLIP`. The front takes all of it up to `GRIP` of its load, beyond that
+  slowly; none from when it slips more than `GRIP_SLIP`.
 - `cap_trailing`: compensation raises the rear's pressure relative to the front's only as far as the estimate
   is certain, with the rear at mu + 2 sigma and the front at mu - 2 sigma.
 
@@ -40,6 +42,8 @@ DISTRIBUTION_STATE = np.dtype(
         ("trailing", "f8"),  # share of its torque that the trailing axle keeps, LEAST_TRAILING to 1
         ("grip", "f8"),  # force over load to which the leading axle takes the rest
         ("spent", "u1"),  # a leading wheel has slipped too much: it grows no more in this braking
+        ("let_go_s", "f8"),  # time for which what the leading wheels slipped then still counts
+        ("slid", "f8", (2,)),  # the least of `rolled` then, fading
         ("rolled", "f8", (2,)),  # by a leading wheel over the distance of the ground below it, low-passed
         ("beyond", "f8", (2,)),  # slip of a trailing wheel less that of the leading one, low-passed
         ("offset", "f8", (2,)),  # the same of a rear wheel while rolling freely: error of the radii
@@ -68,7 +72,7 @@ RULED_FROM = 0.15  # z above which Annex 5 orders the axles
 FASTEST_ROLLING = 1.02  # of the ground below it
 GRIP, GRIP_RATE = 0.6, 0.5  # force over load taken over at once, 1/s beyond it
 GRIP_SLIP = 0.05  # of a leading wheel, beyond which it gives back what it took, as long as it does
-RELEASE_S = 0.2  # s: slip follows the hydraulics, and its low-pass
+RELEASE_S, FOLLOWS_S = 0.2, 0.3  # s: slip follows the hydraulics, and its low-pass; it has followed
 LONE_SLIP = 0.04  # of a trailing wheel beside one that rolls freely: tyres peak at 0.1 on a dry road
 ROUNDING = 1e-9
 
@@ -107,6 +111,14 @@ def _rolled(params: Record, inputs: Record, estimate: Record, speed: float, i: i
     radius = rolling_radius(estimate.load[i], params.unloaded_radius[i], params.vertical_stiffness[i])
     rolled: float = abs(inputs.value[WHEEL_SPEED + i]) * radius / ground
     return rolled if rolled <= FASTEST_ROLLING else math.nan
+
+
+@kernel
+def _excused(state: Record, side: int) -> bool:
+    """Return whether a trailing wheel reads no less than the other one, which was found not to slip."""
+    other = 1 - side
+    excused: bool = state.held_s[other] > DENIED_S and state.slip[side] < state.slip[other] + LEAST_SLIP
+    return excused
 
 
 @kernel
@@ -159,7 +171,10 @@ def watch_trailing(
             continue
         rolled = (rear if trailing > 0.0 else front) * (abs(speed) / max(reckoned, abs(speed)))
         state.slip[side] += SMOOTHING * (1.0 - rolled - state.slip[side])
-        state.rolled[side] += SMOOTHING * ((front if trailing > 0.0 else rear) - state.rolled[side])
+        leads = front if trailing > 0.0 else rear
+        state.rolled[side] += SMOOTHING * (leads - state.rolled[side])
+        if state.let_go_s > 0.0:
+            beyond -= trailing * max(leads - state.slid[side], 0.0)
         if free:
             state.free_s[side] = min(state.free_s[side] + dt, LEARNING_TIME)
             state.offset[side] += dt / state.free_s[side] * (beyond - state.offset[side])
@@ -182,7 +197,7 @@ def watch_trailing(
         if state.held_s[side] > DENIED_S:
             state.offset[side] += trailing * DENIES * dt * max(excess, 0.0)
             denied = True
-        elif slips and not guarded[leading]:
+        elif slips and not (guarded[leading] or _excused(state, side)):
             worst = max(worst, excess)
     change = -TAKE_BACK * worst
     if worst == 0.0:
@@ -201,6 +216,7 @@ def distribute(params: Record, state: Record, mass: float, decel: float, backwar
     lead = 1.0 - front if backwards else front
     trail = (1.0 - lead) * state.trailing
     slips = min(state.rolled[0], state.rolled[1]) < 1.0 - GRIP_SLIP
+    state.let_go_s = max(state.let_go_s - dt, 0.0)
     if not decel > 0.0:
         state.grip, state.spent = GRIP, 0
     elif not (slips or state.spent) and state.trailing < 1.0:
@@ -211,6 +227,11 @@ def distribute(params: Record, state: Record, mass: float, decel: float, backwar
         lead = max(lead, min(1.0 - trail, state.grip * per_grip))
         if slips:
             state.grip, state.spent = min(state.grip, lead / per_grip) * (1.0 - dt / RELEASE_S), 1
+            for side in range(2):
+                back = (state.rolled[side] - state.slid[side]) * dt / FOLLOWS_S
+                slid = state.slid[side] + back if state.let_go_s > 0.0 else 1.0
+                state.slid[side] = min(state.rolled[side], slid)
+            state.let_go_s = FOLLOWS_S
     for i in range(4):
         axle = trail if (i < 2) == backwards else lead
         state.torque[i] = 0.5 * axle * mass * decel * params.wheel_radius[i]

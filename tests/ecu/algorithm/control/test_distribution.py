@@ -294,6 +294,18 @@ def test_a_slip_that_no_relief_changes_is_denied(watch, case, before, since, rea
     assert rear[0] - 1e-9 <= watch.run(since, seconds=1.0) <= rear[1], case
 
 
+@pytest.mark.parametrize(
+    ("left", "taken"),
+    [(-4.5, False), (-5.5, False), (-6.5, True)],
+    ids=["as the right one", "1 %", "2 % more"],
+)
+def test_a_wheel_that_reads_as_the_one_that_was_denied_is_not_held(watch, left, taken) -> None:
+    """Both rear wheel speeds are in one frame; the left one differs once the right one was denied."""
+    watch.run((-4.5, -3, -4.5, -4.5), seconds=1.0)
+    assert watch.run((-3, -3, left, -4.5), seconds=0.1) > 0.95 or taken
+    assert (watch.run((-3, -3, left, -4.5), seconds=0.1) < 0.7) == taken
+
+
 @pytest.mark.parametrize("locks", [14.0, 40.0])
 def test_a_denied_slip_that_grows_as_the_car_slows_stays_denied(watch, locks) -> None:
     """A speed too low by a constant is a share that grows slowly; that of a wheel that locks does not."""
@@ -442,6 +454,44 @@ def test_a_leading_wheel_that_slips_while_nobody_brakes_spends_nothing(params, s
     state["rolled"] = 0.9
     distribute(params[0], state[0], params[0]["mass"], 0.0, False, DT)
     assert (state["grip"][0], state["spent"][0]) == (0.6, 0)
+
+
+def relieved(watch, *stretches, speed: float = 20.0) -> float:
+    """Return the trailing axle's share after `stretches`, each its seconds and the slip [%] of the wheels."""
+    for seconds, slip in stretches:
+        for _ in range(round(seconds / DT)):
+            watch.run(slip, seconds=DT, speed=speed)
+            distribute(watch.params, watch.state, watch.params["mass"], 5.0, speed < 0.0, DT)
+    return float(watch.state["trailing"])
+
+
+RELIEVED = [
+    # case, slip fl fr rl rr [%] as the leading axle lets go, 0.15 s after it, for how long, trailing share
+    ("the front alone slips less", (-6, -6, -6.2, -6.2), (-4, -4, -6.2, -6.2), 0.2, (1.0, 1.0)),
+    ("later it is a measure again", (-6, -6, -6.2, -6.2), (-4, -4, -6.2, -6.2), 0.55, (LEAST_TRAILING, 0.5)),
+    ("the rear slips more than the front did", (-6, -6, -6.2, -6.2), (-4, -4, -8, -8), 0.2, (0.3, 0.5)),
+    ("one front wheel slipped", (-6, -4, -4, -4.6), (-4, -4, -4, -4.6), 0.2, (1.0, 1.0)),
+    ("the front rolls", (-4, -4, -4.2, -4.2), (-2, -2, -4.2, -4.2), 0.2, (LEAST_TRAILING, 0.5)),
+]
+
+
+@pytest.mark.parametrize(
+    ("case", "before", "since", "seconds", "share"), RELIEVED, ids=[r[0] for r in RELIEVED]
+)
+def test_a_leading_axle_that_was_just_relieved_is_no_measure(
+    watch, case, before, since, seconds, share
+) -> None:
+    assert share[0] <= relieved(watch, (0.3, before), (seconds, since)) <= share[1], case
+
+
+def test_in_reverse_the_rear_axle_that_was_just_relieved_is_none(watch) -> None:
+    stretches = (0.3, (-6.2, -6.2, -6, -6)), (0.2, (-6.2, -6.2, -4, -4))
+    assert relieved(watch, *stretches, speed=-8.0) == 1.0
+
+
+def test_what_the_leading_axle_slipped_once_fades(watch) -> None:
+    stretches = (0.1, (-15, -15, -6, -6)), (1.0, (-6, -6, -6, -6)), (0.2, (-4, -4, -8, -8))
+    assert relieved(watch, *stretches) < 0.5
 
 
 @pytest.mark.parametrize("slipped_s", [0.03, 0.06])
