@@ -290,7 +290,7 @@ def cap_trailing(
             trail_nominal += nominal
             trail_force += acts * lever * (mu + 2.0 * sigma) / params.wheel_radius[i]
             trail_motors += motor
-    if not (trail > 0.0 and trail_force > 0.0 and leading > 0):
+    if not (trail_force > 0.0 and leading > 0):
         return
     share = ideal_front_share(params, -decel if backwards else decel)
     share = 1.0 - share if backwards else share

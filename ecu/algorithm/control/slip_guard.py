@@ -266,7 +266,7 @@ def guard_slip(
         target = min(max(WHOLLY * adhesion / params.slip_stiffness[i], LEAST_SLIDING), RANGE) * base
         slipping = watching and lag > target if state.capped[i] else far
         _doubt(params, state, i, ground, slipping, far, dt)
-        begins = far and _grows(state, i) and state.denied[i] == 0
+        begins = far and _grows(state, i)
         if begins and not state.capped[i]:
             state.capped[i], state.cap[i] = 1, sent[i]
         if state.capped[i]:

@@ -91,10 +91,10 @@ def wheel_speed_implausible(
         fast = usable(inputs, WHEEL_SPEED + i) and estimate.speed > LEAST_SPEED and over > FASTER
         alone = over * (wheels - 1) > FASTER * (total - over)  # than the mean of the others; no other: 0 > 0
         state.for_s[i] = state.for_s[i] + dt if fast and alone and braked else 0.0
-        if braked and wheels > 1 and over > 1.0 and usable(inputs, WHEEL_SPEED + i):
+        if braked and wheels > 1 and usable(inputs, WHEEL_SPEED + i):
             beside = max((total - over) / (wheels - 1), 1.0)
-            free = inputs.value[WHEEL_SPEED + i] / over
             if estimate.speed > LEAST_SPEED and over > beside:
+                free = inputs.value[WHEEL_SPEED + i] / over
                 compare(witness, WHEEL_SPEED + i, (over / beside - 1.0) * free, (FASTER - 1.0) * free)
         found = found or state.for_s[i] > DOUBT_S
     return found
