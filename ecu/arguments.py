@@ -2,12 +2,15 @@
 
 import re
 from collections.abc import Callable
+from copy import copy
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
+from typer.main import get_command_name
+from typer.models import CommandInfo
 
 from ecu.completion import known, shipped
 from ecu.output import Level, asked, policy
@@ -102,6 +105,23 @@ class Commands(typer.Typer):
     ) -> Callable[[Any], Any]:
         """Decorate a function as a command of this group."""
         return super().command(name, cls=cls, **options)
+
+    def only(self, name: str) -> "Commands":
+        """Return the group with only its command, or group, of a name: to build all takes 0.05 s.
+
+        The group itself, if it has none of that name.
+        """
+        part = copy(self)
+        part.registered_commands = [one for one in self.registered_commands if _name_of(one) == name]
+        part.registered_groups = [one for one in self.registered_groups if one.name == name]
+        for unnamed in (one.typer_instance for one in self.registered_groups if not one.name):
+            if isinstance(unnamed, Commands) and (found := unnamed.only(name)) is not unnamed:
+                part.add_typer(found)
+        return part if part.registered_commands or part.registered_groups else self
+
+
+def _name_of(command: CommandInfo) -> str:
+    return command.name or get_command_name(command.callback.__name__ if command.callback else "")
 
 
 def config_file(name: str) -> Path:

@@ -307,10 +307,13 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
+    name = "" if COMPLETE in os.environ else next((one for one in arguments if one[:1] != "-"), "")
+    if (program := app.only(name)) is app:
+        _add_commands()
+        program = app.only(name)
     if not is_run(arguments):
         gc.set_threshold(100_000)  # what is imported stays: looking through it again and again takes time
-        _add_commands()
-    return app(arguments, prog_name="brake-ecu", standalone_mode=False) or 0
+    return program(arguments, prog_name="brake-ecu", standalone_mode=False) or 0
 
 
 if __name__ == "__main__":

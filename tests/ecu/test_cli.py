@@ -4,8 +4,11 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+from typer import Context
+from typer.main import get_command
 
 from ecu import __version__, cli
 from ecu.errors import RunFault, UserError
@@ -108,7 +111,7 @@ def test_what_a_command_raises_becomes_one_line(
     def fail(*_: object, **__: object) -> int:
         raise error
 
-    monkeypatch.setattr(cli, "app", fail)
+    monkeypatch.setattr(type(cli.app), "__call__", fail)
     assert cli.main(["demo"]) == code
     printed = capsys.readouterr().err
     assert says in printed
@@ -142,6 +145,18 @@ def test_help_of_every_command_names_the_options_on_output(capsys: pytest.Captur
         assert cli.main([*line.split(), "--help"]) == 0
         said = capsys.readouterr().out
         assert all(said.count(f"{option} ") == 1 for option in ("--quiet", "--verbose", "--json")), line
+
+
+def test_a_command_is_made_alone_as_it_is_among_all() -> None:
+    """And an unknown one is looked for among all."""
+    cli._add_commands()
+    whole: Any = get_command(cli.app)
+    assert cli.app.only("replya") is cli.app
+    for name, command in whole.commands.items():
+        part: Any = get_command(cli.app.only(name))
+        assert list(part.commands) == [name]
+        alone = part.commands[name]
+        assert alone.get_help(Context(alone)) == command.get_help(Context(command))
 
 
 def test_nothing_is_looked_through_when_the_process_ends() -> None:
