@@ -30,13 +30,11 @@ demo: .venv/lab
 	.venv/bin/brake-ecu demo $(ARGS)
 
 test: .venv/dev
-	@echo "Making the library of kernels, and compiling one by one those that only tests call (minutes, once)"
-	@.venv/bin/python -m brakelab.build & build=$$!; \
-		BRAKE_ECU_LIBRARY=0 .venv/bin/python -m brakelab.warm && wait $$build
+	@.venv/bin/python -m brakelab.build --inner tests/compiled
 	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m "not study" $(ARGS)
 
 studies: .venv/dev
-	@.venv/bin/python -m brakelab.build
+	@.venv/bin/python -m brakelab.build --inner tests/compiled
 	.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m study $(ARGS)
 
 check: .venv/dev
@@ -70,7 +68,7 @@ screenshot: .venv/lab
 	.venv/bin/python tools/first_steps.py
 
 clean:
-	rm -rf .venv out build dist ecu/compiled tools/brakelab/compiled .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf .venv out build dist ecu/compiled tools/brakelab/compiled tests/compiled .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 .venv/bin/pip:

@@ -28,7 +28,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 
 from ecu.errors import UserError
 from ecu.interpreted import interpreted
-from ecu.library import FOLDER, Entry, Library
+from ecu.library import FOLDER, Entry, Library, open_library
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -93,9 +93,10 @@ def _imports(package: str, text: bytes) -> Iterator[str]:
 def sources_of_kernels(module: str) -> dict[str, bytes]:
     """Return digests of the texts that the kernels of a module may depend on, by module.
 
-    They are the module and what it imports, directly or not, of its own package and of `ecu`.
+    They are the module and what it imports, directly or not, of its own package, `ecu` and the laboratory.
     """
-    known = _modules("ecu") | _modules(module.partition(".")[0])
+    packages = ("ecu",) if module.startswith("ecu.") else ("ecu", "brakelab", module.partition(".")[0])
+    known = {name: path for package in packages for name, path in _modules(package).items()}
     ahead, found = [module], dict[str, bytes]()
     while ahead:
         name = ahead.pop()
@@ -247,10 +248,8 @@ def library(package: str) -> Library | None:
     if os.environ.get("BRAKE_ECU_LIBRARY") == "0":
         return None
     spec = find_spec(package)
-    for root in (spec.submodule_search_locations or []) if spec else []:
-        with suppress(OSError, ValueError, KeyError, TypeError):  # none, of an earlier form, or damaged
-            return Library(Path(root) / FOLDER)
-    return None
+    roots = (spec.submodule_search_locations or []) if spec else []
+    return next(filter(None, (open_library(Path(root) / FOLDER) for root in roots)), None)
 
 
 @cache

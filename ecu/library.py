@@ -19,6 +19,7 @@ import json
 import platform
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
@@ -280,6 +281,13 @@ class Library:
             function.argtypes, function.restype = [ctypes.c_void_p], ctypes.c_int
             found.append(Entry(kernel, function, _as_tuples(row["arguments"]), _as_tuples(row["returns"])))
         return found
+
+
+def open_library(folder: Path) -> Library | None:
+    """Return the library in `folder`, None: there is none for this processor, or it is damaged."""
+    with suppress(OSError, ValueError, KeyError, TypeError):  # or it is of an earlier form
+        return Library(folder)
+    return None
 
 
 def _as_tuples(value: Any) -> Any:

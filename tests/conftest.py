@@ -17,6 +17,7 @@ from hypothesis import HealthCheck, settings
 
 from brakelab.results import processes
 from ecu import jit
+from ecu.library import Entry, Library, open_library
 
 pytest_plugins = ["brakelab.testing.plugin"]
 """Of this checkout, be it installed or not; the entry point in tools/pyproject.toml has the same name."""
@@ -44,13 +45,24 @@ if os.environ.get("BRAKE_ECU_TEST_LIBRARY") == "0":
         jit.library(package)
     del os.environ["BRAKE_ECU_LIBRARY"]
 
+CHECKOUT = Path(__file__).parent.parent
+INNER = {package: open_library(CHECKOUT / "tests/compiled" / package) for package in ("ecu", "brakelab")}
+"""Kernels that tests call and no program does, see `ecu.build.Inner`; without it numba compiles each."""
+
+
+def _entries(library: Library, kernel: str, nogil: bool = False, own: Any = Library.entries) -> list[Entry]:
+    inner = INNER.get(kernel.partition(".")[0])
+    known = inner is not None and inner.fits(kernel.rpartition(".")[0], jit.text_digest)
+    return own(library, kernel, nogil) + (own(inner, kernel, nogil) if known else [])
+
+
+Library.entries = _entries  # type: ignore[method-assign]
+
 LONG = re.compile(
     r"tests/(system/|test_|golden/|wide_world/|closed_loop/|brakelab/(identify|fleet|report|studies)/"
     r"|ecu/(test_|recording/test_store|algorithm/test_step_extremes))"
 )
 """Files whose tests run processes, trainings, studies or browsers, compile much, or wait for a disk."""
-
-CHECKOUT = Path(__file__).parent.parent
 
 
 def shared_folder() -> Path:

@@ -31,6 +31,7 @@ class Seen:
 
     calls: Final = dict[tuple[Any, ...], Call]()
     modules: Final = set[str]()
+    every: Final = list["Seen"]()
     _depth = 0
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -40,6 +41,7 @@ class Seen:
         self.name = f"{module}.{function.__qualname__}"
         self._plain = interpreted(function)
         self.dispatcher = numba.njit(**OPTIONS)(function)
+        Seen.every.append(self)
 
     def __call__(self, *arguments: Any) -> Any:
         if Seen._depth == 0:

@@ -1,18 +1,19 @@
 """Machine code of kernels that Python calls: by numba up to LLVM's text, llvmlite and a C compiler."""
 
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numba
 from llvmlite import binding, ir  # type: ignore[import-untyped]
 from numba.core import codegen, cpu
 from numba.core.registry import cpu_target
+from numba.np.numpy_support import as_dtype
 
 from ecu.building.c_compiler import compile_shared
-from ecu.building.calls import Call
-from ecu.library import Spec, places_of
+from ecu.building.calls import Call, Seen
+from ecu.library import Spec, layout, places_of
 
 RUNTIME: Final = r"""
 #include <stddef.h>
@@ -60,6 +61,14 @@ COUNTED: Final = {"NRT_incref": 1, "NRT_decref": -1}
 types: Any = numba.core.types  # whose names numba's own annotations hide in part
 
 
+class Row(NamedTuple):
+    """A kernel, the arguments that it is compiled for, and numba's result."""
+
+    name: str
+    arguments: tuple[Spec, ...]
+    result: Any
+
+
 class _Part(codegen.JITCodeLibrary):  # type: ignore[misc]
     """The code of one function, which is neither linked nor run before all is there."""
 
@@ -72,16 +81,16 @@ def _signature(call: Call) -> tuple[Any, ...]:
     return tuple(call.kernel.dispatcher._compiler.fold_argument_types(call.types, {})[1])
 
 
-def translate(calls: Iterable[Call]) -> list[Any]:
-    """Return numba's result for each call, not yet optimised."""
+def translate(calls: Iterable[Call]) -> list[Row]:
+    """Return what numba makes of each call, not yet optimised."""
     codegen.JITCPUCodegen._library_class = _Part
     cpu.CPUContext.get_executable = lambda self, library, fndesc, env: [].append  # a key of its own for each
-    results = []
+    rows = []
     for call in calls:
         signature = _signature(call)
         call.kernel.dispatcher.compile(signature)
-        results.append(call.kernel.dispatcher.overloads[signature])
-    return results
+        rows.append(Row(call.kernel.name, call.specs, call.kernel.dispatcher.overloads[signature]))
+    return rows
 
 
 def _parts(results: Iterable[Any]) -> list[Any]:
@@ -101,13 +110,45 @@ def returned_spec(kind: Any) -> Spec | None:
     if isinstance(kind, types.Boolean):
         return ("bool",)
     if isinstance(kind, types.Integer | types.Float):
-        return ("number", numba.np.numpy_support.as_dtype(kind).str)
+        return ("number", as_dtype(kind).str)
     if isinstance(kind, types.BaseTuple):
-        made = getattr(kind, "instance_class", tuple)
         inside = [returned_spec(part) for part in kind.types]
-        name = f"{made.__module__}:{made.__qualname__}"
-        return None if None in inside else ("tuple", name, *inside)
+        return None if None in inside else ("tuple", _made_by(kind), *inside)
     return None
+
+
+def _made_by(kind: Any) -> str:
+    made = getattr(kind, "instance_class", tuple)
+    return f"{made.__module__}:{made.__qualname__}"
+
+
+def taken_spec(kind: Any) -> Spec | None:
+    """Return the kind of an argument by numba's type, as `ecu.library.spec_of` has it of a value."""
+    if isinstance(kind, types.Array):
+        return ("array", layout(as_dtype(kind.dtype)), kind.ndim, kind.layout, kind.mutable)
+    if isinstance(kind, types.Record):
+        return ("record", layout(as_dtype(kind)))
+    if isinstance(kind, types.NumPyRandomGeneratorType):
+        return ("generator",)
+    if isinstance(kind, types.BaseTuple):
+        inside = [taken_spec(part) for part in kind.types]
+        return None if None in inside else ("tuple", _made_by(kind), *inside)
+    return returned_spec(kind)
+
+
+def within(package: str) -> Iterator[Row]:
+    """Yield the kernels of a package that kernels call, as `translate` has compiled them for that.
+
+    One that is compiled for a constant is compiled for any number in its place.
+    """
+    for kernel in (one for one in Seen.every if one.name.startswith(f"{package}.")):
+        found = kernel.dispatcher.overloads
+        for signature in {tuple(map(types.unliteral, given)): None for given in found}:
+            kernel.dispatcher.compile(signature)
+            given = [kind for kind in signature if not isinstance(kind, types.Omitted)]
+            specs = tuple(spec for kind in given if (spec := taken_spec(kind)) is not None)
+            if len(specs) == len(given):
+                yield Row(kernel.name, specs, found[signature])
 
 
 def _empty_places(spec: Spec) -> list[bool]:
@@ -192,15 +233,15 @@ def _entry(module: Any, symbol: str, result: Any, specs: Sequence[Spec]) -> None
     builder.ret(status)
 
 
-def link(results: list[Any], symbols: list[str], specs: list[Sequence[Spec]]) -> Any:
-    """Return LLVM's module of all results with an entry for each, nothing else visible."""
+def link(rows: Sequence[Row], symbols: Sequence[str]) -> Any:
+    """Return LLVM's module of all kernels with an entry for each, nothing else visible."""
     entries = ir.Module("entries")
     entries.triple = binding.get_process_triple()
     _count_references(entries)
-    for symbol, result, arguments in zip(symbols, results, specs, strict=True):
-        _entry(entries, symbol, result, arguments)
+    for symbol, row in zip(symbols, rows, strict=True):
+        _entry(entries, symbol, row.result, row.arguments)
     whole = binding.parse_assembly(str(entries))
-    for part in _parts(results):
+    for part in _parts(row.result for row in rows):
         for function in part._final_module.functions:
             if function.name in COUNTED and not function.is_declaration:
                 function.linkage = binding.Linkage.linkonce_any  # numba's own are replaced

@@ -161,6 +161,11 @@ def test_the_cycle_s_kernel_counts_on_all_that_it_calls() -> None:
     assert {"ecu.contract.signals", "ecu.contract.params"} <= counted
 
 
+def test_kernels_of_tests_count_on_the_laboratory_s_too() -> None:
+    counted = jit.sources_of_kernels("tests.brakelab.plant.conftest")
+    assert {"brakelab.plant.vehicle", "brakelab.plant.lining"} <= counted.keys()
+
+
 def numba_alone(cache: Path) -> dict[str, str]:
     """Return an environment without the library of kernels."""
     given = {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(cache), "BRAKE_ECU_LIBRARY": "0"}

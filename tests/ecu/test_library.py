@@ -7,11 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
 from ecu import jit, library
 from ecu.building.c_compiler import compiler
+from ecu.building.machine_code import taken_spec
 
 ROOT = Path(__file__).parents[2]
 pytestmark = [
@@ -43,6 +45,11 @@ def inner(value):
 
 
 @kernel
+def at(values, place):
+    return values[place] + place
+
+
+@kernel
 def scalars(real, whole, flag, small):
     return inner(real) + whole + (100.0 if flag else 0.0) + small
 
@@ -51,7 +58,7 @@ def scalars(real, whole, flag, small):
 def record(row, gain):
     row.gain = gain
     row.values[1] += row.count
-    return row.values[1]
+    return at(row.values, 1) - 1.0
 
 
 @kernel
@@ -122,6 +129,9 @@ def results():
         laws.same((1.0, 4, True)), sample.tolist(), laws.scratch(6),
     ]
 
+def more():
+    laws.inner(1)
+
 def plain():
     return json.loads(json.dumps(results(), default=np.ndarray.tolist))
 """
@@ -131,7 +141,7 @@ class Package:
     """A package with kernels, and its library."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder / "thrown_away"
+        self.folder, self.inner = folder / "thrown_away", folder / "inner"
         self.folder.mkdir(parents=True)
         (self.folder / "__init__.py").write_text("")
         self.write(LAWS)
@@ -162,7 +172,10 @@ class Package:
         self.run(
             "from ecu import build\n"
             "def load():\n    import calls; return calls.results\n"
-            "build.leave(build.make('thrown_away', load, True))\n"
+            "def more():\n    import calls; return calls.more\n"
+            "from pathlib import Path\n"
+            f"inner = build.Inner(Path({str(self.inner)!r}), more)\n"
+            "build.leave(build.make('thrown_away', load, True, inner))\n"
         )
 
     def results(self, **environment: str) -> tuple[str, bool]:
@@ -186,6 +199,21 @@ def test_a_library_gives_what_numba_gives_and_loads_no_numba(package: Package) -
     found, numba = package.results()
     assert not numba
     assert (found, True) == package.results(BRAKE_ECU_LIBRARY="0")
+
+
+def test_what_tests_alone_call_is_in_a_library_of_its_own(package: Package) -> None:
+    """Whole numbers before real ones; a kernel that is called with a constant takes any number."""
+    made = library.open_library(package.inner / "thrown_away")
+    assert made is not None
+    assert set(made.manifest["kernels"]) == {"thrown_away.laws.inner", "thrown_away.laws.at"}
+    calls = {"inner": [(1,), (5.0,)], "at": [(np.array([3.0, 4.0, 6.0]), 2)]}
+    found = []
+    for name, rows in calls.items():
+        for entry, row in zip(made.entries(f"thrown_away.laws.{name}"), rows, strict=True):
+            block = entry.take(row)
+            assert block is not None
+            found.append(entry.call(block))
+    assert found == [1.0, 2.0, 8.0]
 
 
 def test_the_least_processor_gives_the_same(package: Package) -> None:
@@ -273,6 +301,7 @@ def test_an_argument_fits_where_numba_would_run_the_same_code(
 ) -> None:
     specs = library.spec_of(wanted), library.spec_of(given)
     assert None not in specs
+    assert specs == (taken_spec(numba.typeof(wanted)), taken_spec(numba.typeof(given)))
     assert library.fits(*specs) is fits
 
 
@@ -349,6 +378,7 @@ print(digest.hexdigest(), len(drive.frames), "numba" in sys.modules)
 """
 
 
+@pytest.mark.study  # numba compiles 800 functions one by one for it
 def test_a_whole_stop_is_the_same_to_the_bit() -> None:
     for package in ("ecu", "brakelab"):
         spec = importlib.util.find_spec(package)
