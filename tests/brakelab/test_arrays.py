@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from brakelab.arrays import arrow_array
+from brakelab.arrays import arrow_array, median
 
 NAN, INF = np.nan, np.inf
 COLUMNS = [
@@ -35,8 +35,19 @@ def test_what_is_not_a_number_is_null(kind, numbers, column) -> None:
 
 def test_pandas_is_not_imported() -> None:
     script = (
-        "import sys, numpy as np, pyarrow as pa\nfrom brakelab.arrays import arrow_array\n"
+        "import sys, numpy as np, pyarrow as pa\nfrom brakelab.arrays import arrow_array, median\n"
         "arrow_array(np.arange(3.0), pa.int8()), arrow_array(['fl'], pa.string())\n"
         "print('pandas' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", script], capture_output=True).stdout == b"False\n"
+
+
+@pytest.mark.parametrize(
+    "values", [[3.0], [2.0, 1.0, 0.1], [0.3, 0.1, 0.7, 0.2], [4, 9, 7, 8], [1.0, NAN, 2.0]]
+)
+def test_a_median_is_numpy_s_to_the_bit(values) -> None:
+    assert repr(median(values)) == repr(float(np.median(values)))
+
+
+def test_a_median_of_nothing_is_not_known() -> None:
+    assert np.isnan(median(np.zeros(0)))

@@ -14,6 +14,15 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
+def median(values: Vector) -> float:
+    """Return the median, NaN if there is a NaN or nothing; numpy's loads masked arrays first."""
+    ordered = np.sort(np.asarray(values, np.float64))
+    if len(ordered) == 0 or np.isnan(ordered[-1]):
+        return float("nan")
+    middle = len(ordered) // 2
+    return float(ordered[middle] if len(ordered) % 2 else (ordered[middle - 1] + ordered[middle]) / 2.0)
+
+
 def arrow_array(values: Any, kind: Any) -> "pa.Array[Any]":
     """Return a column of Arrow: null where a number is NaN, or not finite where `kind` is an integer.
 

@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from brakelab.arrays import arrow_array
+from brakelab.arrays import arrow_array, median
 from brakelab.logs.log_quality import MAX_JUMP_NS, STEP_NS, SignalQuality
 from brakelab.logs.signal_batches import Batch, is_csv
 
@@ -155,7 +155,7 @@ def _on_one_clock(
             shift[row:] += _DAY_S
         else:
             quality.note_clock(place_of(path, batch.places[known[row]]), steps[row])
-            shift[row:] += float(np.median(following)) - steps[row]
+            shift[row:] += median(following) - steps[row]
     if len(t):
         clock.shift_s, clock.last_s = float(shift[-1]), float(t[-1])
         clock.peak_s = max(clock.peak_s, float(t.max()))

@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from brakelab.arrays import arrow_array
+from brakelab.arrays import arrow_array, median
 from brakelab.logs.column_map import ColumnUse, FileUse, MappedFile
 from brakelab.logs.lag import without_lags
 from brakelab.logs.log_quality import MAX_JUMP_NS, SignalQuality
@@ -139,7 +139,7 @@ def check_seconds(path: Path, name: str, t: NDArray[np.float64], or_else: str) -
     Raises:
         UserError: they cannot.
     """
-    step = float(np.median(np.diff(t))) if len(t) > FEW_ROWS else 0.0
+    step = median(np.diff(t)) if len(t) > FEW_ROWS else 0.0
     found = f"the rows are {step:g} s apart" if step > SLOWEST_STEP else ""
     if np.abs(t).max() > LATEST_S:
         found = f"a value is {t[np.abs(t).argmax()]:g} s"

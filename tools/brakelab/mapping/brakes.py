@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, median
 from brakelab.logs.physics.line import BRAKING, MOVING, Fit
 from brakelab.logs.physics.samples import Car
 from brakelab.mapping.candidates import best_of, by_name, unit_of
@@ -94,7 +94,7 @@ def _at_rest(each: list[Series], motion: Motion) -> Vector:
     released = motion.faster(MOVING) & (motion.change > GAINS)
     if not released.any():
         return np.zeros(len(each))
-    return np.array([np.median(motion.smoothed(one)[released]) for one in each])
+    return np.array([median(motion.smoothed(one)[released]) for one in each])
 
 
 def _without_unit(each: list[Series], zeros: Vector, motion: Motion, car: Car) -> tuple[float, str]:
@@ -121,11 +121,11 @@ def _slope(expected: Vector, decel: Vector) -> float:
     if len(expected) < PARTS:
         return 1.0
     parts = np.array_split(np.argsort(expected), PARTS)
-    x, y = (np.array([np.median(values[part]) for part in parts]) for values in (expected, decel))
+    x, y = (np.array([median(values[part]) for part in parts]) for values in (expected, decel))
     low, high = np.triu_indices(PARTS, 1)
     apart = x[high] - x[low]
     slopes = (y[high] - y[low])[apart > 0.0] / apart[apart > 0.0]
-    factor = float(np.median(slopes)) if len(slopes) else 1.0
+    factor = median(slopes) if len(slopes) else 1.0
     return factor if factor > 0.0 else 1.0
 
 

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, median
 from brakelab.logs.column_map import LONGEST_LAG_S, TIMES, seconds_of
 from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.physics.lags import RADIUS, lags
@@ -63,7 +63,7 @@ def _series(name: str, unit: str, t: Vector, value: Vector) -> Series:
     if not known.all() or not (np.diff(t) > 0.0).all():
         t, first = np.unique(t[known], return_index=True)
         value = value[known][first]
-    period = float(np.median(np.diff(t))) if len(t) > 1 else np.nan
+    period = median(np.diff(t)) if len(t) > 1 else np.nan
     flag = set(np.unique(value[:1000]).tolist()) <= FLAG and not converts(unit, "m/s")
     return Series("", name, unit, 0, period, flag, t, value)
 

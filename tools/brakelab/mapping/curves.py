@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, median
 from brakelab.logs.physics.line import LAGS, MOVING, RATE
 from brakelab.logs.physics.samples import Car, Rows
 from brakelab.mapping.candidates import best_of, unit_of
@@ -111,7 +111,7 @@ def _yaw_rate(series: list[Series], motion: Motion, fast: Rows, taken: set[str])
         f"against right less left wheels: correlation {abs(line.correlation):.2f}, slope {slope:+.2f}{where}"
     )
     stood = (motion.speed < STANDING) & motion.known & motion.near(one)
-    zero = float(np.median(signal[stood])) if stood.sum() > LEAST_STOOD else line.intercept
+    zero = median(signal[stood]) if stood.sum() > LEAST_STOOD else line.intercept
     return _with_zero("yaw_rate", one, scale.factor, unit, zero, evidence, scale.warning)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from cantools.database import Database, Message
 from numpy.typing import NDArray
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, median
 from ecu.bus.database import fits
 from ecu.bus.plan import compile_message, decode
 from ecu.bus.units import spelled
@@ -158,7 +158,7 @@ def _series(message: Message, frames: RecordArray, bus: int, start: int) -> list
     values = np.empty((len(frames), len(plan.names)))
     _decode_all(plan.signals, plan.codes, np.ascontiguousarray(frames["data"]), values)
     t, first = np.unique((frames["stamp_ns"] - start) * 1e-9, return_index=True)
-    period = float(np.median(np.diff(t))) if len(t) > 1 else np.nan
+    period = median(np.diff(t)) if len(t) > 1 else np.nan
     signals = {signal.name: signal for signal in message.signals}
     return [
         Series(

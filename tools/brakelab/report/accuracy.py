@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, median
 from brakelab.report.brakings import Braking, inside
 from brakelab.report.drive import DriveResult
 
@@ -95,7 +95,7 @@ def accuracy(estimate: Vector, sigma: Vector, true: Vector, dt: float) -> Accura
 def accuracy_per_axle(drive: DriveResult, truth: DriveResult, found: list[Braking]) -> dict[str, Accuracy]:
     """Return the accuracy of the front and the rear axle over all brake applications."""
     rows = evaluated(drive, truth, found)
-    dt = float(np.median(np.diff(drive.t)))
+    dt = median(np.diff(drive.t))
     estimate, sigma, true = drive.corners("mu_b"), drive.corners("sigma_mu_b"), truth.corners("mu_b")
     return {
         axle: accuracy(estimate[rows, wheels], sigma[rows, wheels], true[rows, wheels], dt)

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, median
 from brakelab.report.accuracy import AXLES
 from brakelab.report.brakings import Braking, inside
 from brakelab.report.drive import DriveResult
@@ -59,7 +59,7 @@ class Section(NamedTuple):
 
 def observed(drive: DriveResult, found: list[Braking]) -> dict[str, list[Observed]]:
     """Return by axle the brake applications in which its friction was observed."""
-    period = float(np.median(np.diff(drive.t)))
+    period = median(np.diff(drive.t))
     speed = np.abs(drive.column("vehicle_speed"))
     by_axle = {}
     for axle, wheels in AXLES.items():

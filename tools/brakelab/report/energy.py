@@ -4,7 +4,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, median
 from brakelab.report.brakings import Braking, inside, inside_any
 from brakelab.report.drive import DriveResult
 from brakelab.report.per_braking import CORNER_MARKS, Series, points_by_braking
@@ -41,7 +41,7 @@ def power(drive: DriveResult, car: Car) -> Vector:
 
 def peaks(drive: DriveResult, found: list[Braking], watts: Vector) -> Vector:
     """Return the greatest power of each brake application, smoothed [W], shape (brake applications, 4)."""
-    period = float(np.median(np.diff(drive.t)))
+    period = median(np.diff(drive.t))
     width = max(1, round(SMOOTHING / period))
     window = np.full(width, 1.0 / width)
     rows = np.full((len(found), len(CORNERS)), np.nan)
@@ -62,7 +62,7 @@ def works(drive: DriveResult, found: list[Braking], car: Car) -> list[Work]:
     known = inside_any(drive, found) & np.isfinite(watts).any(axis=1)
     if not known.any():
         return []
-    period = float(np.median(np.diff(drive.t)))
+    period = median(np.diff(drive.t))
     mean = np.nanmean(np.where(np.isfinite(watts[known]), watts[known], 0.0), axis=0)
     known_corners = [bool(np.isfinite(one).any()) for one in watts[known].T]
     joules = np.where(known_corners, mean * period * known.sum(), np.nan)
@@ -87,7 +87,7 @@ def plots_of_energy(drive: DriveResult, found: list[Braking], car: Car) -> dict[
     """Return the figures by name: work, and the greatest power or power density, per application."""
     watts = power(drive, car)
     numbers = [braking.number for braking in found]
-    period = float(np.median(np.diff(drive.t)))
+    period = median(np.diff(drive.t))
     joules = np.array([_sum(watts[inside(drive, braking)]) * period for braking in found]).reshape(-1, 4)
     dense = bool(np.isfinite(car.pad_area).all())
     label = "Greatest power density [W/mm²]" if dense else "Greatest power [kW]"

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, median
 from brakelab.report.accuracy import AXLES
 from brakelab.report.brakings import Braking, inside, mean_known
 from brakelab.report.drive import DriveResult
@@ -64,7 +64,7 @@ def build_up(t: Vector, pressure: Vector) -> BuildUp:
     highest = pressure.max(initial=0.0)
     if highest < LEAST_BAR:
         return BuildUp(float("nan"), float("nan"), float("nan"))
-    plateau = float(np.median(pressure[pressure > 0.5 * highest]))
+    plateau = median(pressure[pressure > 0.5 * highest])
     high = int(np.argmax(pressure >= HIGH * plateau))
     # The last crossing before it: noise around nothing crosses 10 % early.
     below = np.flatnonzero(pressure[:high] < LOW * plateau)

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, median
 from brakelab.report.accuracy import AXLES
 from brakelab.report.drive import DriveResult
 from brakelab.report.wear_applications import Application
@@ -46,7 +46,7 @@ def distance(drive: DriveResult) -> Vector:
 def kinds(drive: DriveResult) -> NDArray[np.int64]:
     """Return the place in `KINDS` of each row, shape (n,)."""
     speed = 3.6 * np.nan_to_num(np.abs(drive.column("vehicle_speed")))
-    around, rows = int(AROUND / float(np.median(np.diff(drive.t)))), np.arange(len(speed))
+    around, rows = int(AROUND / median(np.diff(drive.t))), np.arange(len(speed))
     first, end = np.maximum(rows - around, 0), np.minimum(rows + around + 1, len(speed))
     kind = np.zeros(len(speed), np.int64)
     for _, limit in KINDS:

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, median
 from brakelab.report.accuracy import AXLES
 from brakelab.report.brakings import Braking, inside
 from brakelab.report.drive import DriveResult
@@ -70,7 +70,7 @@ def reference_of(drive: DriveResult, car: Car, found: list[Braking]) -> Referenc
     torque = np.where(np.nansum(pressed, axis=0) < 0.0, -torque - 2.0 * motors, torque)
     decel = -drive.column("accel_x_road")
     counts = (decel >= RANGE[0]) & (decel <= RANGE[1])
-    dt = float(np.median(np.diff(drive.t)))
+    dt = median(np.diff(drive.t))
     held = max(round(HELD_S / dt), 1)
     stretches = [inside(drive, one) for one in found]
     stretches = [rows for rows in stretches if (rows.stop - rows.start) * dt >= LEAST_S]

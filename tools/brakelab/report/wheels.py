@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 from bokeh.models import ColumnDataSource, Range1d
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, median
 from brakelab.report.downsample import Buckets, drawn
 from brakelab.report.drive import DriveResult
 from brakelab.report.look import (
@@ -120,7 +120,7 @@ def road_speed(turned: Vector, by_slip: Vector) -> Vector:
     Its rolling radius is the one that its slip was computed with.
     """
     both = np.isfinite(by_slip) & (turned > ROLLS)
-    return turned * np.median(by_slip[both] / turned[both]) if both.any() else by_slip
+    return turned * median(by_slip[both] / turned[both]) if both.any() else by_slip
 
 
 def _slip(source: ColumnDataSource, span: Range1d, axle: str, corners: tuple[str, str]) -> Any:

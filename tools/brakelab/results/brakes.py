@@ -13,6 +13,7 @@ from typing import Annotated, Final, NamedTuple, get_type_hints
 
 import numpy as np
 
+from brakelab.arrays import median
 from brakelab.results.dust import airborne_mass, dust_of
 from brakelab.results.prediction import PERIOD, STANDING, Vector, corners, left_out, mean, predict
 from brakelab.results.wear import wear_of
@@ -146,7 +147,7 @@ def friction_means(
     highest = np.nanmax(pressure, initial=0.0)
     if not highest * BAR > p_0 + RELEASE_BAR * BAR:
         return none
-    steady = np.median(pressure[pressure > 0.5 * highest])
+    steady = median(pressure[pressure > 0.5 * highest])
     reached = np.flatnonzero(pressure >= 0.9 * steady)
     first = int(reached[0])
     over = (pressure * BAR < p_0 + RELEASE_BAR * BAR) | (speed < LOWEST_SPEED)

@@ -28,6 +28,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakelab.arrays import median
 from ecu.algorithm.estimation.friction import DRIVEN
 from ecu.algorithm.estimation.joint.whole_filter import FULL_TORQUE, USUAL_SPEED
 from ecu.contract.params import BAR, GRAVITY
@@ -249,6 +250,4 @@ def errors(measured: Sequence[float], predicted: Sequence[float] | Vector) -> Er
         return Errors(0, *[float("nan")] * 4)
     shares = np.asarray(predicted) / np.asarray(measured) - 1.0
     off = np.abs(shares)
-    return Errors(
-        len(shares), float(off.mean()), float(np.median(off)), float(off.max()), float(shares.mean())
-    )
+    return Errors(len(shares), float(off.mean()), median(off), float(off.max()), float(shares.mean()))

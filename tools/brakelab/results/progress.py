@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from typing import Final, TypeVar
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from ecu.compiling import report_compiling
 from ecu.output import say
@@ -31,6 +30,8 @@ def progress_bar(text: str, total: float | None, shown: bool = True) -> Iterator
             with _lines(text, total) as advance:
                 yield advance
             return
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
         columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
         with Progress(*columns, console=console, transient=True) as progress:
             task = progress.add_task(text, total=total)

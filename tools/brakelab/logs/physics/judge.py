@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, median
 from brakelab.logs.physics.curves import lateral_lines
 from brakelab.logs.physics.line import MOVING, RATE, Fit, ranked
 from brakelab.logs.physics.pressures import judge_pressures
@@ -138,7 +138,7 @@ def _wheels(wheels: Vector, rows: Rows, car: Car) -> tuple[list[str], Vector]:
     for i in range(4):
         others = ranked(np.delete(moving, i, axis=1))[1]
         roll = np.abs(others) > 0.5
-        ratios.append(float(np.median(moving[roll, i] / others[roll])))
+        ratios.append(median(moving[roll, i] / others[roll]))
     wrong = [i for i in range(4) if not abs(ratios[i] - 1.0) <= WHEEL[car.known]]
     if len(wrong) > 1:
         front, rear = float(np.mean(ratios[:2])), float(np.mean(ratios[2:]))
@@ -167,7 +167,7 @@ def _speed_scale(
         reference = series["vehicle_speed"]
         there = rows & (np.abs(reference) > 0.5)
         if there.sum() >= LEAST_ROWS:
-            by_reference = abs(float(np.median(speed[there] / reference[there])))
+            by_reference = abs(median(speed[there] / reference[there]))
             if is_apart(by_reference, 1.0 + 0.6 * SCALE[car.known]):
                 if not by_accel or any(not is_apart(one / by_reference, tolerated) for one in by_accel):
                     return by_reference, [_speed_line(by_reference, car, "vehicle_speed says")]
@@ -196,7 +196,7 @@ def _radii(series: InputSeries, speed: Vector, rows: Rows) -> list[str]:
     there = rows & (reference > MOVING) & (change < STEADY * speed)
     if there.sum() < LEAST_ROWS:
         return []
-    factor = float(np.median(speed[there] / reference[there]))
+    factor = median(speed[there] / reference[there])
     if abs(factor - 1.0) < RADII:
         return []
     reads = f"vehicle_speed: reads {times(1.0 / factor)} what wheels of CONFIG's radii roll"

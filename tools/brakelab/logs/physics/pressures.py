@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, median
 from brakelab.logs.physics.line import BRAKING, RATE, fit
 from brakelab.logs.physics.samples import Car, InputSeries, Rows
 from brakelab.logs.physics.sides import Sides, judge_sides
@@ -72,7 +72,7 @@ def _judged(series: InputSeries, car: Car, pressures: Vector, change: Vector, ro
     greatest = np.percentile(np.abs(total[rows]), 99)
     if idle.sum() > LEAST_ROWS:
         released = total[idle]
-        if np.percentile(np.abs(total[rows] - np.median(released)), 99) < NOISE * released.std():
+        if np.percentile(np.abs(total[rows] - median(released)), 99) < NOISE * released.std():
             return Pressures([], [], [])
     pressed = rows & (change < -BRAKING) & (np.abs(total) > 0.3 * greatest)
     if pressed.sum() < LEAST_ROWS:
