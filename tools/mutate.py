@@ -55,6 +55,7 @@ TESTS = {
     "ecu/bus/link.py": ("bus/test_link.py",),
     "ecu/bus/request.py": ("bus/test_request.py",),
     "ecu/bus/freshness.py": ("bus/test_freshness.py",),
+    "ecu/algorithm/monitoring/witness.py": ("algorithm/monitoring/test_witness.py",),
     "ecu/algorithm/monitoring/plausibility.py": ("algorithm/monitoring/test_plausibility.py",),
     "ecu/algorithm/estimation/joint/kalman.py": ("algorithm/estimation/joint/test_kalman.py",),
 }

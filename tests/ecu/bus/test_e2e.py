@@ -7,7 +7,7 @@ import e2e.crc
 import e2e.p01
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import ecu.bus.e2e as protection
@@ -61,14 +61,15 @@ def test_crc_vectors_of_the_autosar_crc_routines(text: str, crc: int) -> None:
     assert p01_crc(data, len(data), (vector[0] ^ 0xFF) | vector[1] << 8) ^ 0xFF == crc
 
 
-@given(data=st.binary(min_size=8, max_size=8), data_id=st.integers(0, 0xFFFF), counter=st.integers(0, 14))
+@given(data=st.binary(min_size=8, max_size=64), data_id=st.integers(0, 0xFFFF), counter=st.integers(0, 14))
+@example(bytes(range(64)), 0x1234, 3)
 @pytest.mark.requirement("REQ-E2E-1")
 def test_profile_1_as_the_e2e_package(data: bytes, data_id: int, counter: int) -> None:
     ours = np.frombuffer(data, np.uint8).copy()
-    p01_protect(ours, 8, data_id, counter)
+    p01_protect(ours, len(data), data_id, counter)
     theirs = bytearray(data)
     theirs[1] = theirs[1] & 0xF0 | counter
-    e2e.p01.e2e_p01_protect(theirs, data_id, length=8, increment_counter=False)
+    e2e.p01.e2e_p01_protect(theirs, data_id, length=len(data), increment_counter=False)
     assert ours.tobytes() == bytes(theirs)
 
 

@@ -8,6 +8,7 @@ import pytest
 from ecu.algorithm.monitoring.witness import (
     WITNESS_STATE,
     begin_watch,
+    believe,
     compare,
     compare_both,
     end_watch,
@@ -57,6 +58,20 @@ def test_doubt_fades_as_fast_as_it_grew(state) -> None:
     judged(state, 0.5, 0.2)
     assert not judged(state, 1.01, 0.2)
     assert judged(state, 1.01, 0.1)
+
+
+@pytest.mark.parametrize("nothing", [math.nan, math.inf])
+def test_what_is_no_number_changes_neither_doubt_nor_agreement(state, nothing) -> None:
+    judged(state, 1.01, 0.25)
+    state["agreed_s"][PLACE], doubted = 0.5, float(state["doubted_s"][PLACE])
+    judged(state, nothing, 0.2)
+    assert (state["agreed_s"][PLACE], state["doubted_s"][PLACE]) == (0.5, doubted)
+
+
+def test_who_is_believed_again_is_not_doubted(state) -> None:
+    judged(state, 3.0, 0.5)
+    believe(state, PLACE)
+    assert (state["rejected"][PLACE], state["doubted_s"][PLACE]) == (0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,11 @@ from ecu.algorithm.estimation.joint.kalman import (
     clear_derivatives,
     clear_state,
     correct,
+    drift_by_derivatives,
     drift_speed,
     forget,
+    forget_speed,
+    variance_by_derivatives,
 )
 from ecu.algorithm.estimation.joint.layout import (
     BIAS,
@@ -203,12 +206,28 @@ def together(states, variance: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("time", [0.01, 0.05, 0.5])
-def test_speed_drifts_with_bias_and_slope(time: float) -> None:
+@pytest.mark.parametrize("drift", [drift_speed, drift_by_derivatives])
+def test_speed_drifts_with_bias_and_slope_or_by_derivatives(drift, time: float) -> None:
     state = some_state(7)
-    F = speed_matrix(time)
+    state["h"][[BIAS, MASS]] = 1.0, 0.0
+    by_derivatives = np.eye(N) + time * np.outer(np.eye(N)[V], state["h"])
+    F = speed_matrix(time) if drift is drift_speed else by_derivatives
     expected = F @ state["p"] @ F.T
-    drift_speed(state, time)
+    drift(state, time)
     np.testing.assert_allclose(state["p"], expected, rtol=1e-10, atol=1e-14)
+
+
+def test_a_variance_is_h_p_h() -> None:
+    state = some_state(8)
+    state["h"][[BIAS, MASS]] = 1.0, 0.0
+    assert variance_by_derivatives(state) == pytest.approx(state["h"] @ state["p"] @ state["h"])
+    np.testing.assert_allclose(state["ph"], state["p"] @ state["h"], rtol=1e-10)
+
+
+def test_a_speed_that_is_taken_anew_is_off_by_half_a_metre_a_second() -> None:
+    state = some_state(13)
+    forget_speed(state)
+    assert state["p"][V].tolist() == state["p"][:, V].tolist() == [0.25 * (j == V) for j in range(N)]
 
 
 def test_levels_widen_together_by_axle_and_by_wheel() -> None:
