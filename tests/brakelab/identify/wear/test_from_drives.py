@@ -11,7 +11,7 @@ import pytest
 
 from brakelab.identify.friction.sequence import Sequence, load_sequence
 from brakelab.identify.wear.applications import FEWEST_APPLICATIONS, ROADS, read_drives, road_blocks, steps_of
-from brakelab.identify.wear.from_drives import COUNT, blocks_from_drives
+from brakelab.identify.wear.from_drives import AGAIN, COUNT, blocks_from_drives
 from brakelab.identify.wear.programme import CHECK_OFF, CONTROLLER, mass_of, stops_of
 from brakelab.identify.wear.reproduced import LARGEST_ERROR, reproduced
 from brakelab.results.brakes import BRAKE_UNITS
@@ -85,7 +85,10 @@ def test_files_are_what_a_rig_and_identify_wear_read(drives, tmp_path, capsys):
     out = tmp_path / "blocks.csv"
     blocks_from_drives(drives, CONFIG, "front", out)
     rows = list(csv.DictReader(out.open()))
-    assert len(rows) == 8
+    assert len(rows) == 9
+    assert rows[-1]["block"] == rows[0]["block"] + AGAIN
+    assert rows[-1]["programme"] == rows[0]["programme"]
+    assert rows[-1]["file"] != rows[0]["file"]
     programme = load_sequence(tmp_path / rows[0]["programme"])
     stops = stops_of(programme)
     assert len(stops) == COUNT

@@ -19,9 +19,10 @@ from brakelab.identify.wear.fit import (
     leave_one_out,
     strangers,
 )
-from brakelab.identify.wear.fusion import SURE, Fused, disagreeing, fuse, unequal
+from brakelab.identify.wear.fusion import SURE, Fused, disagreeing, unequal
 from brakelab.identify.wear.page import tables, write_page
 from brakelab.identify.wear.reader import Block, read_blocks
+from brakelab.identify.wear.running_in import Measured, measured, worn_before
 from brakelab.identify.wear.weighings import SIDES
 from ecu.errors import RunFault, UserError
 from ecu.output import argument, give, say, wrote
@@ -33,9 +34,12 @@ KNOWN_SLOPE: Final = 0.15  # relative standard deviation: above, the density of 
 ROAD: Final = 0.20  # relative: what a brake wears on the road beside a dynamometer (7.20, 7.21; +20 %)
 
 
-def law_error(fit: Fit, mass: Array) -> float:
-    """Return the relative standard deviation of a law on the road, of blocks that lost `mass` [g], (n,)."""
-    return float(np.linalg.norm([leave_one_out(fit, mass), fit.elsewhere, ROAD]))
+def law_error(fit: Fit, mass: Array, run_in: float) -> float:
+    """Return the relative standard deviation of a law on the road, of blocks that lost `mass` [g], (n,).
+
+    `run_in`: that of the masses by what is not known of their running-in.
+    """
+    return float(np.linalg.norm([leave_one_out(fit, mass), fit.elsewhere, run_in, ROAD]))
 
 
 def slope_is_known(fused: Fused) -> bool:
@@ -67,15 +71,19 @@ def law_section(fit: Fit, error: float, pad: Pad, fused: Fused) -> Section:
         "coefficients": (f"[{numbers}]", "g/MJ, g/MJ/K, g/MJ/K^2, g/MW, g/MW/K, g s/MJ^2, …/K"),
         "sigma": (
             f"{min(max(error, 0.02), 0.9):.4f}",
-            "relative: blocks left out, discs 50 K off theirs, the road",
+            "relative: blocks left out, discs 50 K off theirs, running-in, the road",
         ),
     }
 
 
-def _measured(blocks: list[Block]) -> tuple[Fused, Array]:
-    """Return the wear of blocks by balance and thickness, and their regressors, shape (n, 7)."""
-    fused = fuse(np.array([b.lost.wear for b in blocks]), np.array([b.lost.mass for b in blocks]))
-    return fused, np.array([block.regressors for block in blocks])
+def _measured(blocks: list[Block]) -> Measured:
+    lost = [block.lost for block in blocks]
+    return measured(
+        np.array([block.regressors for block in blocks]),
+        np.array([one.wear for one in lost]),
+        np.array([one.mass for one in lost]),
+        worn_before(*np.array([one.weighed for one in lost]).T),
+    )
 
 
 def _agreeing(blocks: list[Block]) -> list[Block]:
@@ -96,17 +104,17 @@ def _agreeing(blocks: list[Block]) -> list[Block]:
             f"block {blocks[place].name}: inboard pad {inboard:.2f} g, outboard {outboard:.2f} g, in the "
             f"others {usual:.2f} to 1; check their weighings"
         )
-    fused, regressors = _measured(blocks)
-    strange = strangers(regressors, fused.mass, np.diag(fused.covariance))
+    every = _measured(blocks)
+    strange = strangers(every.regressors, every.mass, every.variance)
     rest = [block for place, block in enumerate(blocks) if place not in strange]
     if strange:
-        fused, others = _measured(rest)
-        law = fit_law(others, fused.mass, np.diag(fused.covariance))
+        others = _measured(rest)
+        law = fit_law(others.regressors, others.mass, others.variance)
         for place in strange:
             say(
                 f"block {blocks[place].name}: left out, it lost {masses[place]:.2f} g, "
-                f"{regressors[place] @ law.coefficients:.2f} g by the law of the others; check its weighing "
-                "and its file"
+                f"{every.regressors[place] @ law.coefficients:.2f} g by the law of the others; check its "
+                "weighing and its file"
             )
     return rest
 
@@ -135,23 +143,23 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path, columns: P
     blocks = read_blocks(manifest, vehicle, axle, columns)
     try:
         blocks = _agreeing(blocks)
-        fused, regressors = _measured(blocks)
-        variance = np.diag(fused.covariance)
-        fit = fit_law(regressors, fused.mass, variance)
-        static = fit_law(regressors, fused.mass, variance, QUASI_STATIC)
-        if not explains(fit, fused.mass):
+        wear = _measured(blocks)
+        fused = wear.fused
+        fit = fit_law(wear.regressors, wear.mass, wear.variance)
+        static = fit_law(wear.regressors, wear.mass, wear.variance, QUASI_STATIC)
+        if not explains(fit, wear.mass):
             raise RunFault(
                 f"{manifest}: no law explains these blocks better than their mean (R² {fit.r2:.2f}, left out "
-                f"{100 * leave_one_out(fit, fused.mass):.0f} % RMS); check masses and the units of all files"
+                f"{100 * leave_one_out(fit, wear.mass):.0f} % RMS); check masses and the units of all files"
             )
-        section = law_section(fit, law_error(fit, fused.mass), brake.pad, fused)
+        section = law_section(fit, law_error(fit, wear.mass, wear.run_in.sigma), brake.pad, fused)
     except UserError as error:
         raise UserError(
             str(manifest), ": ".join(filter(None, (error.where, error.place))), error.remedy
         ) from None
     head = "# Wear law by `brake-ecu identify wear`."
     write_car(config, out, head, {f"{axle}.pad": section})
-    write_page(page, blocks, fused, fit, static, SHARE[axle] * vehicle.vehicle.mass)
+    write_page(page, blocks, wear, fit, static, SHARE[axle] * vehicle.vehicle.mass)
     named = zip(TERMS, fit.coefficients, UNITS, strict=True)
     kept = ", ".join(f"{name} = {value:.4g} {unit}" for name, value, unit in named if value)
     if np.isfinite(fused.slope) and not slope_is_known(fused):
@@ -160,13 +168,13 @@ def identify_wear(manifest: Path, config: Path, axle: str, out: Path, columns: P
             "off to measure it; the density stays that of CONFIG"
         )
     give(coefficients=dict(zip(TERMS, fit.coefficients, strict=True)), r2=fit.r2)
-    give(left_out=leave_one_out(fit, fused.mass), tables=tables(blocks, fused, fit, static))
+    give(left_out=leave_one_out(fit, wear.mass), tables=tables(blocks, wear, fit, static))
     for one in (block.reproduced for block in blocks):
         if one is not None and one.verdict != "met":
             say(f"block {one.block}: not run as its programme asks, {one.verdict}; see {page}")
     print(f"{out}: {kept}")
     print(
         f"{page}: {len(blocks)} blocks, R² {fit.r2:.4f} (quasi-static {static.r2:.4f}), blocks left out "
-        f"{100 * leave_one_out(fit, fused.mass):.1f} % RMS, rank {fit.rank} of 7"
+        f"{100 * leave_one_out(fit, wear.mass):.1f} % RMS, rank {fit.rank} of 7"
     )
     wrote(*written, next=f"brake-ecu replay LOG --config {argument(out)} --out drive.parquet")

@@ -86,23 +86,23 @@ def _solve(regressors: Array, mass: Array, sigma: Array, terms: tuple[int, ...])
     return coefficients
 
 
-def _sigma(mass: Array, variance: Array, scatter: float) -> Array:
+def sigma_of(mass: Array, variance: Array, scatter: float) -> Array:
     return np.asarray(np.sqrt(variance + (scatter * mass) ** 2))
 
 
-def _fit_terms(
+def fit_terms(
     regressors: Array, mass: Array, variance: Array, terms: tuple[int, ...]
 ) -> tuple[Array, float, float]:
     """Return coefficients, scatter and the criterion for a set of terms."""
     scatter, count = 0.03, len(mass)
     coefficients = np.zeros(regressors.shape[1])
     for _ in range(20):
-        coefficients = _solve(regressors, mass, _sigma(mass, variance, scatter), terms)
+        coefficients = _solve(regressors, mass, sigma_of(mass, variance, scatter), terms)
         residual = (mass - regressors @ coefficients) / mass
         free = max(count - int(np.count_nonzero(coefficients)), 1)
         own = float(residual @ residual) / free - float(np.mean(variance / mass**2))
         scatter = max(float(np.sqrt(max(own, 0.0))), LEAST_SCATTER)
-    sigma = _sigma(mass, variance, scatter)
+    sigma = sigma_of(mass, variance, scatter)
     residual = (mass - regressors @ coefficients) / sigma
     k = float(np.count_nonzero(coefficients)) + 1.0  # the scatter is one more
     likelihood = float(residual @ residual + 2.0 * np.sum(np.log(sigma / mass)))
@@ -136,9 +136,9 @@ def fit_law(
         )
     most = min(rank, len(mass) - 2, len(allowed))
     sets = [terms for size in range(1, most + 1) for terms in combinations(allowed, size)]
-    tried = [_fit_terms(regressors, mass, variance, terms) for terms in sets]
-    sigmas = [_sigma(mass, variance, scatter) for _, scatter, _ in tried]
-    unseen = np.array([_left_out(regressors, mass, *one) for one in zip(sigmas, sets, strict=True)])
+    tried = [fit_terms(regressors, mass, variance, terms) for terms in sets]
+    sigmas = [sigma_of(mass, variance, scatter) for _, scatter, _ in tried]
+    unseen = np.array([left_out_by(regressors, mass, *one) for one in zip(sigmas, sets, strict=True)])
     error = np.maximum(np.sqrt(np.mean((unseen / mass - 1.0) ** 2, axis=1)), LEAST_ERROR)
     prior = np.array([rare ** len(set(terms) - set(WORK)) for terms in sets])
     weight = prior * (error / error.min()) ** (-0.5 * len(mass))
@@ -168,7 +168,7 @@ def _warmer(regressors: Array, kelvin: float) -> Array:
     return np.column_stack([e, et + k * e, ett + 2.0 * k * et + k * k * e, r, rt + k * r, p, pt + k * p])
 
 
-def _left_out(regressors: Array, mass: Array, sigma: Array, terms: tuple[int, ...]) -> Array:
+def left_out_by(regressors: Array, mass: Array, sigma: Array, terms: tuple[int, ...]) -> Array:
     """Return the mass [g] of each block by the law of the others, shape (n,)."""
     found = np.empty(len(mass))
     for i in range(len(mass)):

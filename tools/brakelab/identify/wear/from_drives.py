@@ -26,6 +26,8 @@ from ecu.settings.config import load_config, new_params
 
 COUNT: Final = 300
 """Applications of a block; the thesis has 250 and more."""
+AGAIN: Final = "-again"
+"""Of the first block, run once more at the end: what it then wears less is running-in, not heat."""
 
 
 def blocks_from_drives(drives: list[Path], config: Path, axle: str, out: Path) -> None:
@@ -59,15 +61,20 @@ def blocks_from_drives(drives: list[Path], config: Path, axle: str, out: Path) -
     for block, programme, table in zip(blocks, programmes, stops, strict=True):
         write_text(programme, programme_text(block, mass))
         write_text(table, controller_text(block, mass, brake))
-        run = f"{programme.stem}-run.csv"
-        rows.writerow([block.name, run, programme.name, f"{road_energy(block):.4f}", "", ""])
+    for place, again in [*((place, "") for place in range(len(blocks))), (0, AGAIN)]:
+        block, programme = blocks[place], programmes[place]
+        run = f"{programme.stem}{again}-run.csv"
+        rows.writerow([f"{block.name}{again}", run, programme.name, f"{road_energy(block):.4f}", "", ""])
     write_text(out, manifest.getvalue())
     write_chart(picture, block_panels(blocks), LEGEND)
     found = block_table(blocks, mass, left_out)
     head = f"# Blocks for a dynamometer, from {len(drives)} {'drive' if len(drives) == 1 else 'drives'}\n\n"
     write_text(page, f"{head}![Applications and steps]({picture.name})\n\n{markdown(found).rstrip()}\n")
     names = ", ".join(block.name for block in blocks)
-    print(f"{out}: {len(blocks)} blocks of {COUNT} applications ({names}) for {len(road.energy)} on the road")
+    print(
+        f"{out}: {len(blocks)} blocks of {COUNT} applications ({names}) for {len(road.energy)} on the road, "
+        "the first once more at the end: it shows the running-in of the pads"
+    )
     inertia = mass * brake.radius**2
     print(f"{page}: how they stand for the drives; a flywheel for {mass:.0f} kg, {inertia:.1f} kg m²")
     give(blocks=[block.name for block in blocks], mass=mass, applications=len(road.energy), left_out=left_out)

@@ -11,6 +11,7 @@ from brakelab.identify.wear.fit import TERMS, UNITS, Fit, leave_one_out
 from brakelab.identify.wear.fusion import Fused
 from brakelab.identify.wear.reader import Block
 from brakelab.identify.wear.reproduced import reproduced_table
+from brakelab.identify.wear.running_in import Measured, RunIn
 from brakelab.results.chart import BLUE, GREEN, GREY, ORANGE, PINK, Cells, Line, Panel, write_chart
 from brakelab.results.text_table import Table, cell, markdown
 
@@ -79,7 +80,7 @@ def residual_panels(blocks: list[Block], mass: Array, fit: Fit) -> list[Panel]:
     wide = max(1.2 * float(np.abs(np.concatenate([residual, left_out])).max()), 1.0)
     diagonal = np.array([0.0, most])
     panels = [
-        Panel("by the law over measured [g]", "measured [g]", (0.0, most), (0.0, most), [
+        Panel("by the law over measured [g], pads run in", "measured [g]", (0.0, most), (0.0, most), [
             Line(diagonal, diagonal, GREY, True), Line(mass, fit.predicted, BLUE, marks=True),
         ])
     ]  # fmt: skip
@@ -135,8 +136,24 @@ def fusion_panel(blocks: list[Block], fused: Fused) -> list[Panel]:
     return [Panel(title, "linear wear [mm]", (0.0, float(ends[1])), (0.0, top), lines)]
 
 
-def tables(blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> list[Table]:
+def run_in_line(run_in: RunIn) -> str:
+    """Return what is known of the running-in of the pads, in one sentence."""
+    if not run_in.known:
+        return (
+            "The masses are not those of one set of pads, block after block: nothing says whether its pads "
+            f"were run in ({100 * run_in.sigma:.0f} %, σ)."
+        )
+    most = 100.0 * float(run_in.factor.max() - 1.0)
+    alone = "" if run_in.repeated else "; no block repeats another: only the law tells it from heat"
+    return (
+        f"Pads wore faster while they ran in, by {most:.0f} % at most, which is taken off (sure to "
+        f"{100 * run_in.sigma:.0f} %, σ, over all blocks{alone})."
+    )
+
+
+def tables(blocks: list[Block], wear: Measured, fit: Fit, static: Fit) -> list[Table]:
     """Return coefficients, blocks and the comparison of the two laws as tables."""
+    fused = wear.fused
     coefficients = [
         (name, unit, f"{value:.4g}", f"{low:.4g}–{high:.4g}" if value else "left out")
         for name, unit, value, low, high in zip(
@@ -149,20 +166,21 @@ def tables(blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> list[Tab
             f"{block.applications}",
             f"{block.regressors[0]:.1f}",
             f"{block.temperature:.0f}",
+            f"{lost:.3f}",
             f"{mass:.3f}",
             f"{predicted:.3f}",
             f"{100 * (predicted / mass - 1):+.1f}",
             f"{100 * (left_out / mass - 1):+.1f}",
         )
-        for block, mass, predicted, left_out in zip(
-            blocks, fused.mass, fit.predicted, fit.left_out, strict=True
+        for block, lost, mass, predicted, left_out in zip(
+            blocks, fused.mass, wear.mass, fit.predicted, fit.left_out, strict=True
         )
     ]
     laws = [
         (
             name,
             f"{each.r2:.4f}",
-            f"{100 * leave_one_out(each, fused.mass):.1f}",
+            f"{100 * leave_one_out(each, wear.mass):.1f}",
             f"{100 * each.scatter:.1f}",
             f"{each.criterion:.1f}",
             f"{each.rank}",
@@ -183,11 +201,11 @@ def tables(blocks: list[Block], fused: Fused, fit: Fit, static: Fit) -> list[Tab
         ),
         Table(
             "Blocks",
-            ("block", "applications", "energy [MJ]", "disc [degC]", "mass [g]", "law [g]", "error [%]",
-             "left out [%]"),
+            ("block", "applications", "energy [MJ]", "disc [degC]", "mass [g]", "run in [g]", "law [g]",
+             "error [%]", "left out [%]"),
             rows,
-            f"Mass: balance and thickness blended (7.11); mass over linear wear K: {slope}. Left out: by the "
-            "law of the other blocks.",
+            f"Mass: balance and thickness blended (7.11); mass over linear wear K: {slope}. "
+            f"{run_in_line(wear.run_in)} Left out: by the law of the other blocks.",
         ),
         Table(
             "The two laws",
@@ -251,12 +269,14 @@ def _beside(blocks: list[Block]) -> list[Table]:
     return [reproduced_table(found)] if found else []
 
 
-def write_page(page: Path, blocks: list[Block], fused: Fused, fit: Fit, static: Fit, of_brake: float) -> None:
+def write_page(
+    page: Path, blocks: list[Block], wear: Measured, fit: Fit, static: Fit, of_brake: float
+) -> None:
     """Write the tables and the panels of the law; `of_brake`: mass that one brake slows [kg]."""
     picture = page.with_suffix(".svg")
-    panels = [*law_panels(blocks, fused.mass, fit, static, of_brake), *fusion_panel(blocks, fused)]
+    panels = [*law_panels(blocks, wear.mass, fit, static, of_brake), *fusion_panel(blocks, wear.fused)]
     write_chart(picture, panels, LEGEND)
-    parts = [markdown(table) for table in tables(blocks, fused, fit, static)]
+    parts = [markdown(table) for table in tables(blocks, wear, fit, static)]
     head = (
         f"# Wear law of {len(blocks)} blocks\n\n![Specific wear (Figure 7.9), sensitivity (Figure 7.10), "
         f"residuals, balance and thickness blended (Figures 7.7, 7.8)]({picture.name})\n\n"

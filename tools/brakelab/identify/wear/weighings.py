@@ -28,8 +28,8 @@ LIGHTEST_DISC, HEAVIEST_DISC = 1e3, 40e3  # g
 class Lost(NamedTuple):
     """Lost in a block; NaN: not measured."""
 
-    mass: float
-    """Of both pads by the balance, g."""
+    weighed: tuple[float, float]
+    """Both pads before and after by the balance, g."""
     wear: float
     """Of a pad by thickness, mean of both, mm."""
     sides: tuple[float, float]
@@ -44,6 +44,11 @@ class Lost(NamedTuple):
     """g"""
     disc_wear: float
     """Of its thickness, both faces, mm."""
+
+    @property
+    def mass(self) -> float:
+        """Return what both pads lost by the balance [g]."""
+        return self.weighed[0] - self.weighed[1]
 
 
 class _Row(NamedTuple):
@@ -75,9 +80,11 @@ def read_lost(manifest: Path, line: int, cells: dict[str, str], pad: Pad) -> Los
     """
     row = _Row(manifest, f"line {line}", cells)
     apart = [row.has(f"{side}_mass_before") or row.has(f"{side}_mass_after") for side in SIDES]
-    sides = tuple(_mass(row, f"{side}_") for side in SIDES) if any(apart) else (math.nan, math.nan)
+    pads = [_weighed(row, f"{side}_") for side in SIDES] if any(apart) else [(math.nan, math.nan)] * 2
+    sides = tuple(before - after for before, after in pads)
     together = row.has("mass_before") or not any(apart)
-    mass = _mass(row, "") if together else sides[0] + sides[1]
+    weighed = _weighed(row, "") if together else (pads[0][0] + pads[1][0], pads[0][1] + pads[1][1])
+    mass = weighed[0] - weighed[1]
     if together and any(apart) and abs(mass - sum(sides)) > SURE * math.sqrt(6.0) * BALANCE:
         remedy = f"the pads lost {sides[0]:.2f} + {sides[1]:.2f} g, both together {mass:.2f} g; correct one"
         raise UserError(str(manifest), f"{row.where}, block {cells['block']}", remedy)
@@ -90,9 +97,9 @@ def read_lost(manifest: Path, line: int, cells: dict[str, str], pad: Pad) -> Los
     each = np.mean(points, axis=0) if points else np.full(POINTS, np.nan)
     thin = (float(np.nanmean(points[0])), float(np.nanmean(points[1]))) if names else (math.nan, math.nan)
     return Lost(
-        mass,
+        weighed,
         float(np.nanmean(each)) if points else math.nan,
-        (float(sides[0]), float(sides[1])),
+        (sides[0], sides[1]),
         thin,
         float(each[:2].mean() - each[4:].mean()),
         float(each[::2].mean() - each[1::2].mean()),
@@ -101,13 +108,13 @@ def read_lost(manifest: Path, line: int, cells: dict[str, str], pad: Pad) -> Los
     )
 
 
-def _mass(row: _Row, side: str) -> float:
+def _weighed(row: _Row, side: str) -> tuple[float, float]:
     before, after = (row.number(f"{side}mass_{when}") for when in ("before", "after"))
     if not before > after:
         which = f"{side.rstrip('_')} pad" if side else "pads"
         remedy = f"{which} gained mass ({before:g} to {after:g} g)"
         raise UserError(str(row.manifest), f"{row.where}, block {row.cells['block']}", remedy)
-    return before - after
+    return before, after
 
 
 def _measured(row: _Row, side: str) -> bool:

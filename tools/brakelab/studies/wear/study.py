@@ -9,8 +9,9 @@ from numpy.random import Generator
 from brakelab.arrays import Array
 from brakelab.identify.wear.command import law_error
 from brakelab.identify.wear.fit import QUASI_STATIC, Fit, fit_law
-from brakelab.identify.wear.fusion import POINTS, fuse
+from brakelab.identify.wear.fusion import POINTS
 from brakelab.identify.wear.reader import stop_regressors
+from brakelab.identify.wear.running_in import measured
 from brakelab.simulation.campaigns.instruments import measure_points, weigh, workshop_gauge
 from brakelab.simulation.campaigns.wear_blocks import (
     COLUMNS,
@@ -98,10 +99,10 @@ def dynamometer_laws() -> dict[str, Law]:
             for block in programme(car, wheel, DYNAMOMETER_CAR)
         ]
         x, mass, wear = (np.array(values) for values in zip(*rows, strict=True))
-        fused = fuse(wear, mass)
+        run = measured(x, wear, mass, np.cumsum(mass) - mass)
         for law, allowed in zip(LAWS, (tuple(range(7)), QUASI_STATIC), strict=True):
-            fits[law].append(fit_law(x, fused.mass, np.diag(fused.covariance), allowed))
-            sigma[law].append(law_error(fits[law][-1], fused.mass))
+            fits[law].append(fit_law(x, run.mass, run.variance, allowed))
+            sigma[law].append(law_error(fits[law][-1], run.mass, run.run_in.sigma))
     return {
         law: Law(
             np.repeat(np.column_stack([fit.coefficients for fit in fits[law]]), 2, axis=1),
