@@ -26,8 +26,9 @@ from brakelab.identify.dust.features import (
 )
 from brakelab.identify.friction.check import numbers_of, refuse_units, say_unlike
 from brakelab.identify.friction.columns import Columns, load_columns
-from brakelab.identify.friction.reader import in_si
+from brakelab.identify.friction.reader import in_si, positive
 from brakelab.identify.friction.recording import Recording
+from brakelab.identify.friction.sensors import without_zero
 from brakelab.identify.manifest import measured_rows, read_manifest, refuse_row
 from brakelab.identify.measurement_files import check_celsius, read_columns
 from brakelab.identify.units import COUNTED
@@ -120,6 +121,10 @@ def read_trip(path: Path, name: str, test: bool, described: Columns) -> Recorded
     _check_ranges(path, even)
     speed, pressure, torque, temperature, concentration, flow = even.values()
     pressure = pressure - described.rig.push_out_pressure
+    braked = Recording(
+        grid, 1e5 * (pressure + described.rig.push_out_pressure), positive(torque), speed, temperature
+    )
+    torque = without_zero(braked, described, str(path)).torque
     trip = Recorded(
         name, test, grid - grid[0], np.maximum(speed, 0.0), pressure, np.abs(torque), temperature,
         concentration, flow, counted,

@@ -21,6 +21,7 @@ import numpy as np
 from brakelab.arrays import Vector
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.recording import Recording
+from brakelab.identify.friction.sensors import refuse_air, refuse_hung
 from brakelab.identify.friction.stops import Stops, find_stops
 from brakelab.identify.units import UNITS
 from brakelab.simulation.configured import with_keys
@@ -190,6 +191,8 @@ def refuse_units(
     if max(float(np.ptp(one.temperature)) for one in applications) < STILL:
         name = columns.columns.temperature[0]
         raise UserError(where, name, "does not rise when the brake is applied; give the disc's thermocouple")
+    refuse_hung(whole, columns, where)
+    refuse_air(whole, columns, where)
     if late := thermocouple_delay(whole):
         remedy = f"follows the braking {late:.1f} s late; shift the column, or take a faster thermocouple"
         raise UserError(where, columns.columns.temperature[0], remedy)
@@ -237,6 +240,8 @@ def refuse_nonsense(recording: Recording, columns: Columns, where: str) -> Numbe
         raise UserError(where, "speed", "does not change; give the column of the disc's speed")
     if np.ptp(recording.temperature) < STILL:
         raise UserError(where, "temperature", "does not change; give the column of the disc's thermocouple")
+    refuse_hung(recording, columns, where, ("pressure", "speed", "temperature"))
+    refuse_air(recording, columns, where)
     numbers, _ = measure(recording, columns, where)
     mistake = likeliest(numbers, columns)
     if mistake is not None:

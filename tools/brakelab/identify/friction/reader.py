@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from brakelab.arrays import Vector
 from brakelab.identify.friction.columns import ENDS, Columns, load_columns
 from brakelab.identify.friction.recording import NAMES, Recording
+from brakelab.identify.friction.sensors import without_zero
 from brakelab.identify.measurement_files import header_of, numbers_in
 from brakelab.identify.samples import LONGEST_GAP, alone, bridged, continued
 from brakelab.identify.units import UNITS, ZEROS
@@ -101,7 +102,10 @@ def read_recording(path: Path, columns: Path | None = None, known: Columns | Non
         f"{path}: {damage.damaged} {rows} left out, first: {damage.first_damaged}" if damage.damaged else ""
     )
     cut = f"{path}: {damage.cut}" if damage.cut else ""
-    return Read(_in_si(raw, described), described, labels, "; ".join(part for part in (note, cut) if part))
+    recording = _in_si(raw, described)
+    if not ends:
+        recording = without_zero(recording, described, str(path))
+    return Read(recording, described, labels, "; ".join(part for part in (note, cut) if part))
 
 
 def _filled(raw: Vector, described: Columns) -> Vector:
@@ -224,8 +228,8 @@ def _text(sample: object) -> str:
 def _in_si(raw: Vector, described: Columns) -> Recording:
     """Return the numbers of a file in the units of a recording."""
     si = {quantity: in_si(described, quantity, values) for quantity, values in zip(NAMES, raw, strict=True)}
-    si["torque"] = _positive(si["torque"]) * (2.0 / described.rig.pads)
-    si["speed"] = _positive(si["speed"])
+    si["torque"] = positive(si["torque"]) * (2.0 / described.rig.pads)
+    si["speed"] = positive(si["speed"])
     return Recording(**si)
 
 
@@ -238,6 +242,6 @@ def in_si(described: Columns, quantity: str, values: Vector) -> Vector:
     return np.asarray((values - ZEROS.get(unit, 0.0)) * factor)
 
 
-def _positive(values: Vector) -> Vector:
+def positive(values: Vector) -> Vector:
     """Return `values` with the sign that makes their sum positive: noise about zero keeps its own."""
-    return -values if values.sum() < 0.0 else values
+    return -values if np.nansum(values) < 0.0 else values

@@ -16,8 +16,9 @@ import numpy as np
 from brakelab.arrays import Array
 from brakelab.identify.friction.check import Numbers, refuse_units, say_unlike
 from brakelab.identify.friction.columns import Columns
-from brakelab.identify.friction.reader import read_recording
+from brakelab.identify.friction.reader import positive, read_recording
 from brakelab.identify.friction.recording import Recording
+from brakelab.identify.friction.sensors import without_zero
 from brakelab.identify.friction.sequence import read_sequence
 from brakelab.identify.manifest import measured_rows, read_manifest, refuse_row
 from brakelab.identify.measurement_files import check_celsius, read_columns
@@ -144,6 +145,8 @@ def read_stops(
         columns = read_columns(path, COLUMNS, "block")
         t = columns["t"]
         columns = {name: bridged(t, values, LONGEST_GAP) for name, values in columns.items()}
+        signed = _recording(columns)._replace(torque=positive(columns["brake_torque"]))
+        columns["brake_torque"] = without_zero(signed, described, str(path)).torque
     pressed = columns["calliper_pressure"] > push_out + PRESSED
     stops = [
         {name: column[start:end] for name, column in columns.items()} for start, end in stretches(pressed)
