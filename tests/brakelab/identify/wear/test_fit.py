@@ -5,7 +5,7 @@ import pytest
 
 from brakelab.identify.wear.command import slope_is_known
 from brakelab.identify.wear.fit import QUASI_STATIC, explains, fit_law, rank_of, strangers
-from brakelab.identify.wear.fusion import BALANCE, POINT, POINTS, disagreeing, fuse, unequal
+from brakelab.identify.wear.fusion import BALANCE, POINT, POINTS, disagreeing, doubtful, fuse, unequal
 from ecu.errors import UserError
 
 pytestmark = pytest.mark.study
@@ -156,6 +156,36 @@ def test_balance_and_thickness_that_disagree(grams: float, found: list[int]):
     wear[1] = np.nan
     mass[3] += grams
     assert [place for place, _ in disagreeing(wear, mass)] == found
+
+
+# scatter of thickness beside mass, grams mistyped in a block -> share of programmes that name it, another one
+DOUBTED = {
+    "as sure as both are": (0.0, 0.8, 0.4, 0.02),
+    "as sure as both are, more": (0.0, 1.2, 0.75, 0.02),
+    "worn unevenly": (0.03, 1.2, 0.6, 0.05),
+    "nothing wrong": (0.0, 0.0, 0.0, 0.05),
+    "nothing wrong, worn unevenly": (0.05, 0.0, 0.0, 0.1),
+}
+
+
+@pytest.mark.parametrize(("uneven", "grams", "share", "wrongly"), DOUBTED.values(), ids=DOUBTED)
+def test_a_block_weighed_wrongly_beside_its_thickness_is_doubted_over_seeds(uneven, grams, share, wrongly):
+    named, others = 0, 0
+    for seed in range(100):
+        random = np.random.default_rng([seed, 8])
+        true = random.uniform(2.0, 6.0, 7)
+        mass = true + np.sqrt(2.0) * BALANCE * random.standard_normal(7)
+        wear = true / 28.0 * (1.0 + uneven * random.standard_normal(7))
+        wear += POINT * np.sqrt(2.0 / POINTS) * random.standard_normal(7)
+        mass[4] += grams
+        places = {place for place, _ in doubtful(wear, mass)}
+        named += 4 in places
+        others += bool(places - ({4} if grams else set()))
+        if 4 in places and grams:
+            assert fuse(wear, mass).covariance[4, 4] > 0.2 * grams**2
+    print(named, others)
+    assert named >= 100 * share
+    assert others <= 100 * wrongly
 
 
 @pytest.mark.parametrize(("grams", "found"), [(0.0, []), (0.8, [3]), (-0.7, [3]), (0.15, [])])

@@ -6,7 +6,7 @@ import pytest
 from brakelab.identify.wear.fit import fit_law
 from brakelab.identify.wear.fusion import BALANCE
 from brakelab.identify.wear.page import run_in_line
-from brakelab.identify.wear.running_in import TARE, Measured, measured, run_in_mass, worn_before
+from brakelab.identify.wear.running_in import TARE, Measured, measured, run_in_mass, unlinked, worn_before
 
 from .test_fit import LAW, by_a_step_of_heat, regressors
 
@@ -92,6 +92,11 @@ CHAINS = {
     "worn between blocks": ([900.0, 880.0, 870.0], [897.0, 878.0, 868.0], [0.0, 20.0, 30.0]),
     "damp pads": ([900.0, 897.0 + 0.8 * TARE], [897.0, 895.0], [0.0, 3.0 - 0.8 * TARE]),
     "new pads for each": ([900.0, 899.0, 901.0], [897.0, 897.0, 896.0], None),
+    "one mistyped by 0.8 g": (
+        [900.0, 897.0, 895.0, 892.0],
+        [897.0, 894.2, 892.0, 890.0],
+        [0.0, 3.0, 5.0, 8.0],
+    ),
     "what it lost, from the same number": ([450.0, 450.0], [447.0, 448.0], None),
 }
 
@@ -100,6 +105,20 @@ CHAINS = {
 def test_what_was_worn_off_comes_of_the_masses(before, after, begun):
     found = worn_before(np.array(before), np.array(after))
     assert (found is None) if begun is None else found.tolist() == pytest.approx(begun)
+
+
+# grams of which the second block's last mass is wrong -> what is named: that block, the next, and by how much
+LINKS = {"right": (0.0, []), "too light": (-0.8, [(1, 2, 0.8)]), "too heavy": (0.7, [(1, 2, -0.7)])}
+
+
+@pytest.mark.parametrize(("grams", "named"), LINKS.values(), ids=LINKS)
+def test_masses_that_do_not_follow_one_another_are_named(grams, named):
+    before = np.array([900.0, 897.05, 895.0, 892.02, 889.0])
+    after = np.array([897.0, 895.02 + grams, 892.05, 889.0, 885.0])
+    found = [(one, other, pytest.approx(by, abs=0.05)) for one, other, by in unlinked(before, after)]
+    assert found == named
+    apart = before - 3.0 * np.arange(5), after - 3.0 * np.arange(5)
+    assert unlinked(*apart) == []  # worn between the blocks
 
 
 def test_where_nothing_says_what_was_worn_off_the_masses_stay_and_sigma_grows():

@@ -19,10 +19,10 @@ from brakelab.identify.wear.fit import (
     leave_one_out,
     strangers,
 )
-from brakelab.identify.wear.fusion import SURE, Fused, disagreeing, unequal
+from brakelab.identify.wear.fusion import SURE, Fused, disagreeing, doubtful, unequal
 from brakelab.identify.wear.page import tables, write_page
 from brakelab.identify.wear.reader import Block, read_blocks
-from brakelab.identify.wear.running_in import Measured, measured, worn_before
+from brakelab.identify.wear.running_in import Measured, measured, unlinked, worn_before
 from brakelab.identify.wear.weighings import SIDES
 from ecu.errors import RunFault, UserError
 from ecu.output import argument, give, say, wrote
@@ -103,6 +103,18 @@ def _agreeing(blocks: list[Block]) -> list[Block]:
         say(
             f"block {blocks[place].name}: inboard pad {inboard:.2f} g, outboard {outboard:.2f} g, in the "
             f"others {usual:.2f} to 1; check their weighings"
+        )
+    for one, other, grams in unlinked(*np.array([block.lost.weighed for block in blocks]).T):
+        ended, began = blocks[one].name, blocks[other].name
+        say(
+            f"block {began}: begins {abs(grams):.2f} g {'heavier' if grams > 0 else 'lighter'} than block "
+            f"{ended} ended, unlike the others; check mass_after of {ended} and mass_before of {began}"
+        )
+    thickness = np.array([block.lost.wear for block in blocks])
+    for place, grams in doubtful(thickness, masses):
+        say(
+            f"block {blocks[place].name}: it lost {masses[place]:.2f} g by the balance, {grams:.2f} g by its "
+            "thickness, unlike the others; it counts less: check both"
         )
     every = _measured(blocks)
     strange = strangers(every.regressors, every.mass, every.variance)

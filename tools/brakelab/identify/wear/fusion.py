@@ -17,6 +17,8 @@ POINT: Final = 0.010  # mm, of one thickness at one point
 POINTS: Final = 6
 UNEVEN: Final = 0.25  # of the mass: by it six points may miss what wears unevenly
 SURE: Final = 5.0  # standard deviations
+FAR: Final = 4.0  # likewise, of a block that counts less
+NORMAL: Final = 0.6745  # median of the magnitude of a normal deviate
 
 
 class Fused(NamedTuple):
@@ -48,6 +50,23 @@ def disagreeing(wear: NDArray[np.float64], mass: NDArray[np.float64]) -> list[tu
     return [(int(k), float(by_thickness[k])) for k in known if abs(mass[k] - by_thickness[k]) > allowed[k]]
 
 
+def doubtful(wear: NDArray[np.float64], mass: NDArray[np.float64]) -> list[tuple[int, float]]:
+    """Return the blocks of which balance and thickness differ by far more than in the others, as above.
+
+    Beside what both are sure to counts how much they differ in most of the blocks, of which five are needed.
+    """
+    known = np.flatnonzero(np.isfinite(wear))
+    if len(known) < 5:
+        return []
+    usual = float(np.median(mass[known] / wear[known]))
+    off = (mass - usual * wear)[known]
+    noise = float(np.hypot(np.sqrt(2.0) * BALANCE, usual * POINT * np.sqrt(2.0 / POINTS)))
+    uneven = max(float(np.median(off**2)) / NORMAL**2 - noise**2, 0.0)
+    share = mass[known] / float(np.median(mass[known]))
+    allowed = FAR * np.sqrt(noise**2 + uneven * share**2)
+    return [(int(k), usual * float(wear[k])) for k in known[np.abs(off) > allowed]]
+
+
 def unequal(inboard: NDArray[np.float64], outboard: NDArray[np.float64]) -> list[tuple[int, float]]:
     """Return the blocks of which the pads share their wear unlike in the others, and the usual ratio.
 
@@ -75,6 +94,8 @@ def fuse(wear: NDArray[np.float64], mass: NDArray[np.float64]) -> Fused:
     fused, variance = mass.copy(), own.copy()
     fused[known] = slope * (y + per_slope * x) / (slope + per_slope)  # (7.11) on y = K x
     variance[known] = 1.0 / (1.0 / sigma_y**2 + 1.0 / (slope * sigma_x) ** 2)
+    for place, by_thickness in doubtful(wear, mass):
+        variance[place] += (mass[place] - by_thickness) ** 2  # one of the two is wrong
     share = np.zeros(len(mass))
     share[known] = x * per_slope / (slope + per_slope)  # d fused / d K, the direction held
     of_slope = (sigma_y**2 + (slope * sigma_x) ** 2) / float(x @ x)

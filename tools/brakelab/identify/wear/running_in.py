@@ -15,7 +15,7 @@ and by how much blocks that repeat one another differ in them. Without a block t
 running-in explain the same masses where the order follows the heat; `sigma` says what that leaves open.
 """
 
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -32,6 +32,8 @@ NONE: Final = 0.5  # prior odds that pads are run in, or hardly do
 ALIKE: Final = 0.1  # by which work, heat and power of two blocks differ at most, of those that repeat
 REPEATS: Final = 0.05  # relative standard deviation of the wear of a block run again
 TARE: Final = 0.5  # g by which pads may gain between two blocks: moisture, another day's balance
+
+LINKED: Final = 0.15  # g, likewise, of blocks that follow one another
 
 
 class RunIn(NamedTuple):
@@ -73,10 +75,27 @@ def worn_before(before: Array, after: Array) -> Array | None:
 
     None: they are not of one set of pads that is worn from block to block.
     """
-    order = np.argsort(-before, kind="stable")
-    if np.any(before[order][1:] > after[order][:-1] + TARE):
+    gained = np.array([grams for _, _, grams in _between(before, after)])
+    mistyped = 1 if unlinked(before, after) else 0
+    if np.count_nonzero(gained > TARE) > mistyped:
         return None
     return np.asarray(before.max() - before)
+
+
+def unlinked(before: Array, after: Array) -> list[tuple[int, int, float]]:
+    """Return which blocks do not begin with the mass [g] that another one ended with, as most do.
+
+    Places of the block that ended and of that which began, and what was gained between them.
+    """
+    between = _between(before, after)
+    if len(between) < 3 or np.median([abs(grams) for _, _, grams in between]) > LINKED:
+        return []
+    return [one for one in between if abs(one[2]) > TARE]
+
+
+def _between(before: Array, after: Array) -> list[tuple[int, int, float]]:
+    order = [int(place) for place in np.argsort(-before, kind="stable")]
+    return [(one, other, float(before[other] - after[one])) for one, other in pairwise(order)]
 
 
 def run_in_mass(begun: Array, mass: Array, gain: float, decay: float) -> Array:

@@ -172,7 +172,8 @@ def wear_tables(cars: list[CarDrives], laws: dict[str, Law], lives: list[Life]) 
             ("law", "coefficients (95 % confidence)", "R² of the blocks", "spread given [%]"),
             _law_rows(laws),
             "Eight blocks of 300 applications; units as Table 7.1, disc in degC. Spread: blocks left out, "
-            f"discs {ELSEWHERE:.0f} K off theirs, and {100 * ROAD:.0f} % for the transfer to the road.",
+            f"discs {ELSEWHERE:.0f} K off theirs, what is open of their running-in, and {100 * ROAD:.0f} % "
+            "for the transfer to the road.",
         ),
     ]  # fmt: skip
 
