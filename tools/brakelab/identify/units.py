@@ -5,7 +5,11 @@ from typing import Final
 UNITS: Final[dict[str, dict[str, float]]] = {
     "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
     "pressure": {"bar": 1e5, "kPa": 1e3, "MPa": 1e6, "Pa": 1.0, "psi": 6894.757},
-    "torque": {"N m": 1.0, "Nm": 1.0, "kN m": 1e3, "lbf ft": 1.355818},
+    "torque": {
+        **dict.fromkeys(("N m", "Nm", "N·m"), 1.0),
+        **dict.fromkeys(("kN m", "kNm"), 1e3),
+        **dict.fromkeys(("lbf ft", "ft-lb", "lb-ft", "ft·lbf"), 1.355818),
+    },
     "speed": {
         "rad/s": 1.0,
         "rpm": 0.10471976,

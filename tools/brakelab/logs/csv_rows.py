@@ -1,8 +1,8 @@
 """Reads CSV text into columns of text, a block of whole lines at a time, so that every row knows its line.
 
-Cells stand between commas, semicolons or tabs, whichever the line of names has; with semicolons or tabs a
-decimal comma is a point, and what separates thousands is left out. A line that is damaged is skipped and
-counted; a last line that is not whole is not used.
+Cells stand between commas, semicolons or tabs, whichever the line of names has; with semicolons or tabs, and
+in quotes, a decimal comma is a point, and what separates thousands is left out. A line that is damaged is
+skipped and counted; a last line that is not whole is not used.
 """
 
 import io
@@ -157,7 +157,7 @@ def _parsed(
         damage.note_damage(len(wrong), f"line {lines[row]} ({reason})")
         lines = np.delete(lines, [row for row, _ in wrong])
     columns = [table.column(name).combine_chunks() for name in wanted]
-    if pointed:
+    if pointed or b'"' in text:  # in quotes a comma stands within a cell
         if b"," in text and b"." in text:
             columns = _without_groups(columns)
         columns = [_pointed(column) for column in columns]

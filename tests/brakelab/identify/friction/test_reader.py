@@ -115,6 +115,19 @@ def test_thousands_are_numbers(tmp_path: Path, recording: Recording, strange: Wr
     assert read.recording.speed == pytest.approx(recording.speed, abs=1e-4)
 
 
+def test_thousands_in_quotes_between_commas_are_numbers(
+    tmp_path: Path, recording: Recording, strange: Write
+) -> None:
+    """ "1,234.5" rpm, as American rigs write it: all rows above a thousand were left out."""
+    path = strange(tmp_path, recording)
+    head, *rows = path.read_text("utf-8").splitlines()
+    american = [",".join(f'"{float(c.replace(",", ".")):,.6f}"' for c in row.split(";")) for row in rows]
+    path.write_text("\n".join([head.replace(";", ","), *american, ""]), "utf-8")
+    read = read_recording(path)
+    assert read.damaged == ""
+    assert read.recording.speed == pytest.approx(recording.speed, abs=1e-4)
+
+
 def test_whole_numbers_with_thousands_are_numbers(
     tmp_path: Path, recording: Recording, strange: Write
 ) -> None:
