@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from brakelab.cli import app
 from brakelab.identify.friction import choice, command
-from brakelab.identify.friction.choice import Job, Judged, choose, hottest, judge
+from brakelab.identify.friction.choice import Job, Judged, choose, hottest, judge, ties
 from brakelab.identify.friction.columns import Columns, load_columns
 from brakelab.identify.friction.fit import error_of
 from brakelab.identify.friction.reader import read_recording
@@ -213,6 +213,19 @@ def judged(name: str, overall: float, criterion: float) -> Judged:
 )
 def test_the_choice(laws: list[tuple[str, float, float]], expected: str) -> None:
     assert choose(tuple(judged(*law) for law in laws), 60).name == expected
+
+
+def test_laws_that_miss_the_same_stops_alike_are_a_tie() -> None:
+    """Stops differ by far more than the laws do; in each one law is surely worse, another is not."""
+    random = np.random.default_rng(3)
+    hard = random.lognormal(-6.0, 1.0, 40)
+    near, far = (hard * (1.0 + of + 0.2 * random.standard_normal(40)) for of in (0.02, 0.5))
+    laws = [
+        judged(name, 4.0, -10.0)._replace(misses=tuple(m))
+        for name, m in zip("abc", (hard, near, far), strict=True)
+    ]
+    assert [one.name for one in ties(laws, laws[0])] == ["b"]
+    assert ties([one._replace(misses=one.misses[:3]) for one in laws], laws[0]) == []
 
 
 def test_a_law_of_more_numbers_than_stops_is_not_chosen() -> None:

@@ -21,7 +21,7 @@ import numpy as np
 from brakelab.identify.friction.candidate import Candidate
 from brakelab.identify.friction.candidates import candidates
 from brakelab.identify.friction.columns import Columns
-from brakelab.identify.friction.fit import Fitted, error_of, fit, refit
+from brakelab.identify.friction.fit import Fitted, error_of, fit, refit, replayed
 from brakelab.identify.friction.stops import Stops, some
 from brakelab.plant.friction.law import Law, RigBrake
 from brakelab.results.processes import new_pool
@@ -30,6 +30,8 @@ HELD_OUT: Final = 0.2
 TIE: Final = 1.05
 STAYS: Final = 1.25  # of the least error, up to which a law that is bounded comes first
 PROCESSES: Final = 2
+FEWEST_STOPS: Final = 5  # that show a scatter
+SURELY: Final = 2.0  # standard deviations, of two laws that differ
 
 
 class Judged(NamedTuple):
@@ -48,6 +50,8 @@ class Judged(NamedTuple):
     unidentified: tuple[str, ...]
     starts: str  # that agreed, of those tried
     extrapolates: str
+    misses: tuple[float, ...] = ()
+    """Mean square of each stop that it had not seen, as it is used."""
 
 
 class Identified(NamedTuple):
@@ -132,6 +136,9 @@ def judge(job: Job) -> Judged:
     else:
         law, unseen = fitted.law, job.unseen
     overall = held_out = error_of(law, job.brake, unseen, closed=True)
+    square = (replayed(law, job.brake, unseen, starts_at_measured=False, closed=True) - unseen.mu) ** 2
+    samples = np.bincount(unseen.block_stop, minlength=len(unseen))
+    misses = np.bincount(unseen.block_stop, square, len(unseen)) / np.maximum(samples, 1)
     if job.unseen is None:
         every = error_of(fitted.law, job.brake, job.stops, closed=True)
         overall = float(np.sqrt((1.0 - HELD_OUT) * every**2 + HELD_OUT * held_out**2))
@@ -152,6 +159,7 @@ def judge(job: Job) -> Judged:
         tuple(fitted.unidentified()),
         f"{fitted.agreed} of {fitted.tried}",
         candidate.extrapolates,
+        tuple(misses.tolist()),
     )
 
 
@@ -170,6 +178,21 @@ def choose(laws: tuple[Judged, ...], stops: int) -> Judged:
     among = staying or laws
     best = min(judged.overall for judged in among)
     return min((one for one in among if one.overall <= TIE * best), key=lambda one: one.criterion)
+
+
+def ties(laws: Sequence[Judged], chosen: Judged) -> list[Judged]:
+    """Return the laws that miss the stops not seen as the chosen one does, within their scatter.
+
+    Pairs, stop by stop: a stop that is hard to tell is hard for all.
+    """
+    found = []
+    for judged in laws:
+        if judged.name == chosen.name or len(judged.misses) < FEWEST_STOPS:
+            continue
+        more = np.array(judged.misses) - np.array(chosen.misses)
+        if abs(more.mean()) < SURELY * more.std(ddof=1) / np.sqrt(len(more)):
+            found.append(judged)
+    return found
 
 
 def _span(values: np.ndarray) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from brakelab.identify.friction.analysis import history_effect, principal_components
 from brakelab.identify.friction.check import refuse_nonsense
-from brakelab.identify.friction.choice import hottest, identify, known_candidates
+from brakelab.identify.friction.choice import hottest, identify, known_candidates, ties
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.discovered_law import discovered_law
 from brakelab.identify.friction.dynamometer import new_bench
@@ -167,8 +167,14 @@ def friction(
         show(Console(), table)
     write_lining(out, measured.columns, measured.heating, identified)
     write_report(page, measured.columns, measured.stops, identified, tables, unseen)
-    give(chosen=identified.chosen.name, stops=identified.stops)
+    tied = [judged.name for judged in ties(identified.laws, identified.chosen)]
+    give(chosen=identified.chosen.name, ties=tied, stops=identified.stops)
     wrote(out, page)
+    if tied:
+        say(
+            f"{out}: tie: {', '.join(tied)} miss the stops not seen as {identified.chosen.name} does, within "
+            "their scatter; another programme as --held-out shows more"
+        )
     say(f"{out}: the law chosen under the name SIM; {page}: how well and how far it holds")
 
 

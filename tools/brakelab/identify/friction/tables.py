@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from brakelab.identify.friction.analysis import Components, History
-from brakelab.identify.friction.choice import Identified, Judged
+from brakelab.identify.friction.choice import Identified, Judged, ties
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.fit import Fitted, replayed
 from brakelab.identify.friction.heat_capacity import UNSHOWN, HeatCapacity
@@ -46,14 +46,16 @@ def law_tables(identified: Identified, unseen: str) -> list[Table]:
     chosen = (
         f"Unseen: {unseen}, in closed loop: the measured torque is demanded, the pressure follows from the "
         "law, whose memory starts as on a car. Overall: the law is chosen by it; all stops by their number, "
-        f"or what is unseen where it was given. Chosen: {identified.chosen.name}."
+        f"or what is unseen where it was given. Chosen: {identified.chosen.name}"
     )
+    if tied := ties(identified.laws, identified.chosen):
+        chosen += f"; a tie with {', '.join(judged.name for judged in tied)}, stop by stop within 2 σ"
     return [
         Table(
             "Laws",
             ("law", "numbers", "nRMSE [%]", "unseen [%]", "overall [%]", "criterion", "agree"),
             errors,
-            chosen,
+            f"{chosen}.",
         ),
         Table("Where laws end", ("law", "numbers not identified by these stops", "note"), limits, seen),
     ]
