@@ -6,7 +6,11 @@ Exit code 0 on success, 1 when the run found a fault, 2 for bad arguments, confi
 """
 
 import os
+import signal
 import sys
+
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # Ctrl-C shows no traceback of imports
+    signal.signal(signal.SIGINT, lambda *_: os._exit(128 + signal.SIGINT))
 
 from ecu.imports import without_modules
 from ecu.recording.sink import free_output
@@ -20,7 +24,6 @@ if is_run(sys.argv[1:]):  # under load, importing the command line alone would t
 import atexit
 import errno
 import gc
-import io
 import traceback
 from functools import cache
 from importlib.metadata import entry_points
@@ -29,7 +32,7 @@ from typing import Annotated
 
 import typer
 
-from ecu import __version__
+from ecu import __version__, streams
 from ecu.arguments import (
     CHANNEL_OPTION,
     CONFIG_OPTION,
@@ -63,6 +66,8 @@ FLEET = ("distributed", "fsspec")
 LEARN = ("sklearn",)
 """Packages of the extra `learn`."""
 
+INTERRUPTED, UNREAD = 128 + signal.SIGINT, 128 + signal.SIGPIPE
+"""Exit codes of a command that Ctrl-C ended and of one whose output nobody reads, as a shell gives them."""
 COMPLETE = "_BRAKE_ECU_COMPLETE"
 """Set by the shell that asks for completion."""
 
@@ -268,28 +273,32 @@ def _add_commands() -> int:
     return len(others)
 
 
-def _open_streams() -> None:
-    """Open those of the standard streams that were closed: the next files would take their places."""
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            stream = open(os.devnull, mode, encoding="utf-8")  # noqa: SIM115
-            os.set_inheritable(stream.fileno(), True)
-            setattr(sys, name, stream)
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Run one command line and return its exit code."""
-    arguments = arguments or sys.argv[1:] or ["--help"]
-    _open_streams()
-    for stream in (sys.stdout, sys.stderr):  # of a locale, or a file's name, that lacks a character of a line
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
+    streams.prepare()
+    try:
+        code = _answered(arguments or sys.argv[1:] or ["--help"])
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:
+        streams.empty()
+        return UNREAD
+
+
+def _answered(arguments: list[str]) -> int:
+    """Run one command line, print the error that it ends with, and return its exit code.
+
+    Raises:
+        BrokenPipeError: nobody reads what it prints.
+    """
     with new_policy() as asked:
         try:
             code = _run(arguments)
         except (KeyboardInterrupt, typer.Abort):
-            return 130
+            return INTERRUPTED
         except Exception as error:
+            if isinstance(error, BrokenPipeError) and streams.are_unread():
+                raise
             if COMPLETE in os.environ:
                 return 1  # nothing to complete after a mistake
             if os.environ.get("BRAKE_ECU_DEBUG") == "1":
@@ -313,8 +322,14 @@ def _run(arguments: list[str]) -> int:
         program = app.only(name)
     if not is_run(arguments):
         gc.set_threshold(100_000)  # what is imported stays: looking through it again and again takes time
-    return program(arguments, prog_name="brake-ecu", standalone_mode=False) or 0
+    try:
+        return program(arguments, prog_name="brake-ecu", standalone_mode=False) or 0
+    except SystemExit as ended:  # typer's and rich's answer to a broken pipe
+        raise ended.__context__ or ended from None
 
+
+if getattr(signal.getsignal(signal.SIGINT), "__module__", "") == __name__:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 if __name__ == "__main__":
     raise SystemExit(main())

@@ -120,10 +120,7 @@ def argument(path: Path | str) -> str:
 
 def print_given() -> None:
     """Print what was given as one JSON object; what is not a number or not finite is null."""
-    try:
-        print(json.dumps(_plain(policy().given), indent=1, ensure_ascii=False), flush=True)
-    except BrokenPipeError:  # the reader has seen enough
-        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    print(json.dumps(_plain(policy().given), indent=1, ensure_ascii=False), flush=True)
 
 
 def _plain(value: Any) -> Any:

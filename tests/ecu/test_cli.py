@@ -1,5 +1,6 @@
 """What a user reads who typed something wrong: one line, and the exit code."""
 
+import errno
 import re
 import subprocess
 import sys
@@ -190,6 +191,40 @@ def test_a_closed_stream_is_an_empty_one(words: str, says: str, tmp_path: Path) 
     assert ended.returncode == 2
     assert "nosuch" not in ended.stdout
     assert ended.stderr.startswith(says)
+
+
+@pytest.mark.parametrize("words", ["config schema", "config check suv", "--help", "nosuch 2>&1", "doctor"])
+def test_output_that_nobody_reads_is_no_mistake(words: str) -> None:
+    """As a shell reports a program that SIGPIPE ended."""
+    command = ["sh", "-c", f'exec 3>&1; ("$0" -P -m ecu.cli {words}; echo $? >&3) | true', sys.executable]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert (ended.stdout, ended.stderr) == ("141\n", "")
+
+
+def test_another_broken_pipe_is_a_fault(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def run(*_: object) -> None:
+        raise BrokenPipeError(errno.EPIPE, "Broken pipe")
+
+    monkeypatch.setattr("ecu.doctor.doctor", run)
+    assert cli.main(["doctor"]) == 1
+    monkeypatch.undo()
+
+
+def test_an_interruption_while_it_loads_is_quiet() -> None:
+    """The signal comes with an import in the middle of them."""
+    code = (
+        "import os, signal, sys\n"
+        "class Interrupting:\n"
+        "    def find_spec(self, name, path, target=None):\n"
+        "        if name == 'ecu.arguments':\n"
+        "            os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Interrupting())\n"
+        "import ecu.cli\n"
+    )
+    ended = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (130, "")
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
