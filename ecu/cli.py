@@ -297,7 +297,7 @@ def _answered(arguments: list[str]) -> int:
         except (KeyboardInterrupt, typer.Abort):
             return INTERRUPTED
         except Exception as error:
-            if isinstance(error, BrokenPipeError) and streams.are_unread():
+            if isinstance(error, BrokenPipeError) and (streams.are_unread() or streams.is_nowhere()):
                 raise
             if COMPLETE in os.environ:
                 return 1  # nothing to complete after a mistake

@@ -22,10 +22,13 @@ def are_unread() -> bool:
     """Return whether the reader of standard output or error has gone."""
     poll = select.poll()
     for handle in (1, 2):
-        if os.path.samestat(os.fstat(handle), os.stat(os.devnull)):
-            return True  # rich leads it there after a broken pipe
         poll.register(handle, 0)
     return any(found & (select.POLLERR | select.POLLHUP) for _, found in poll.poll(0))
+
+
+def is_nowhere() -> bool:
+    """Return whether standard output goes to nowhere: rich leads it there after a broken pipe."""
+    return os.path.samestat(os.fstat(1), os.stat(os.devnull))
 
 
 def empty() -> None:

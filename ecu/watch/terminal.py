@@ -14,6 +14,7 @@ from typing import Final
 from rich.console import Console
 from rich.live import Live
 
+from ecu.streams import are_unread
 from ecu.watch.history import COLUMN
 from ecu.watch.keep import keep_now
 from ecu.watch.line import json_line, text_line
@@ -24,6 +25,7 @@ DRAWN_S: Final = 0.2
 NOTE_S: Final = 8.0
 STEPS_S: Final = {b"\x1b[D": 1.0, b"\x1b[C": -1.0, b"\x1b[A": 10.0, b"\x1b[B": -10.0}
 """Arrow keys: how much further back they go."""
+WITHOUT_DIGITS: Final = str.maketrans("", "", "0123456789")
 END: Final = (b"\x1b[F", b"\x1bOF", b"\x1b[4~", b"e")
 
 
@@ -121,14 +123,20 @@ def show(watcher: Watcher, folder: Path) -> int:
 
 
 def print_lines(watcher: Watcher, as_json: bool) -> int:
-    """Print a line a second until Ctrl-C or until nobody reads it; return the exit code 0."""
-    printed_s = 0.0
+    """Print a line a second until Ctrl-C or until nobody reads it; return the exit code 0.
+
+    That no cycles come is one line, whatever its figures count meanwhile.
+    """
+    printed_s, said = 0.0, ""
     try:
         while True:
             watcher.turn()
-            if time.monotonic() - printed_s >= 1.0:
-                printed_s = time.monotonic()
+            trouble = watcher.trouble.translate(WITHOUT_DIGITS)
+            if time.monotonic() - printed_s >= 1.0 and not (trouble and trouble == said):
+                printed_s, said = time.monotonic(), trouble
                 print(json_line(watcher) if as_json else text_line(watcher), flush=True)
+            if trouble and are_unread():
+                break
             time.sleep(PERIOD_S)
     except (KeyboardInterrupt, BrokenPipeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

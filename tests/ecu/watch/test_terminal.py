@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from ecu.recording.recorder import read_recording
+from ecu.watch import terminal
 from ecu.watch.terminal import Screen, _pressed
-from ecu.watch.watcher import Watcher
+from ecu.watch.watcher import PERIOD_S, Watcher
 
 ROOT = Path(__file__).parents[3]
 LEFT, RIGHT, UP, DOWN, END = b"\x1b[D", b"\x1b[C", b"\x1b[A", b"\x1b[B", b"\x1b[F"
@@ -96,3 +97,32 @@ def test_a_real_terminal_of_40_columns_is_left_as_it_was():
     assert termios.tcgetattr(theirs) == before
     os.close(ours)
     os.close(theirs)
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_that_no_cycles_come_is_one_line(rings, monkeypatch, capfd, as_json):
+    turns = [*["no daemon runs"] * 90, *[""] * 60, *[f"no cycle for {k} s" for k in range(90)]]
+    watcher = Watcher(None)
+    now_s = 1000.0
+
+    def turn():
+        nonlocal now_s
+        now_s += PERIOD_S
+        if not turns:
+            raise KeyboardInterrupt
+        watcher.trouble = turns.pop(0)
+
+    monkeypatch.setattr(watcher, "turn", turn)
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: now_s)
+    monkeypatch.setattr(terminal.time, "sleep", lambda _: None)
+    monkeypatch.setattr(terminal.os, "dup2", lambda *_: None)
+    assert terminal.print_lines(watcher, as_json) == 0
+    monkeypatch.undo()
+    lines = capfd.readouterr().out.splitlines()
+    assert [sum(said in line for line in lines) for said in ("no daemon runs", "no cycle for")] == [1, 1]
+    assert len(lines) == 2 + 3  # between them a line a second, as ever
+
+
+def test_it_ends_with_its_reader_also_while_no_cycles_come():
+    line = ["sh", "-c", '"$0" -P -m ecu.cli watch nosuch | head -1', sys.executable]
+    assert subprocess.run(line, capture_output=True, text=True, timeout=60).stdout.count("\n") == 1
