@@ -34,6 +34,16 @@ def named(name: str, *folders: str) -> Path:
     raise UserError(name, "", f"no such file, and none that is shipped ({names}){closest(name, shipped)}")
 
 
+def regular(path: Path, what: str) -> Path:
+    """Return `path`, a file that can be read to its end. Raises UserError: it is none; give `what`."""
+    if not path.exists():
+        raise UserError(str(path), "", f"no such file; give {what}")
+    if not path.is_file():
+        kind = "a folder" if path.is_dir() else "no regular file"
+        raise UserError(str(path), "", f"is {kind}; give {what}")
+    return path
+
+
 def command_name(path: Path) -> str:
     """Return what names a file on the command line: a shipped one's name, else its path."""
     return path.stem if path in shipped_in("config", "config/maps", *SCENARIOS).values() else str(path)

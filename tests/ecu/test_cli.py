@@ -193,6 +193,22 @@ def test_a_closed_stream_is_an_empty_one(words: str, says: str, tmp_path: Path) 
     assert ended.stderr.startswith(says)
 
 
+def test_a_file_that_is_not_there_is_refused_before_what_would_read_it_is_imported() -> None:
+    lines = (
+        "identify friction no.csv --out x.toml",
+        "identify vehicle no.csv --config suv --out x.toml",
+        "identify wear . --config suv --out x.toml",
+        "lab look no.csv",
+        "map suggest no.log",
+        "play no.log -i virtual -c a",
+    )
+    code = "import sys\nfrom ecu import cli\nfor one in sys.argv[1:]: print(cli.main(one.split()))"
+    code += "\nprint({'numpy', 'pyarrow', 'scipy'} & set(sys.modules))"
+    ended = subprocess.run([sys.executable, "-P", "-c", code, *lines], capture_output=True, text=True)
+    assert ended.stdout.split() == ["2"] * len(lines) + ["set()"]
+    assert ended.stderr.count("no such file; give an existing file") == len(lines) - 1
+
+
 @pytest.mark.parametrize("words", ["config schema", "config check suv", "--help", "nosuch 2>&1", "doctor"])
 def test_output_that_nobody_reads_is_no_mistake(words: str) -> None:
     """As a shell reports a program that SIGPIPE ended."""

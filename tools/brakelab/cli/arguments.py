@@ -5,7 +5,15 @@ from typing import Annotated
 
 from ecu.arguments import argument, option, scenario_file
 from ecu.completion import known, shipped
-from ecu.settings.resources import SCENARIOS
+from ecu.settings.resources import SCENARIOS, regular
+
+
+def present(given: list[Path] | Path | None) -> list[Path] | Path | None:
+    """Return given files, each of which is there: said before anything is imported that reads them."""
+    for path in given if isinstance(given, list) else [given] if given else []:
+        regular(path, "an existing file")
+    return given
+
 
 Plant = Annotated[
     str | None,

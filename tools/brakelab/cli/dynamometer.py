@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any
 
-from brakelab.cli.arguments import Columns
+from brakelab.cli.arguments import Columns, present
 from ecu.arguments import Commands, argument, option
 from ecu.completion import fitting, shipped
 from ecu.settings.resources import resource
@@ -60,7 +60,9 @@ def run(
 
 @app.command()
 def look(
-    data: Annotated[list[Path], argument("DATA", "Recordings of one brake: .csv .parquet .mf4")],
+    data: Annotated[
+        list[Path], argument("DATA", "Recordings of one brake: .csv .parquet .mf4", callback=present)
+    ],
     columns: Columns = None,
 ) -> None:
     """Analyse a recording. Show principal components, shares of variance, effect of the previous stop."""
@@ -71,9 +73,9 @@ def look(
 
 @app.command()
 def report(
-    data: Annotated[Path, argument("DATA", "Recording of a programme: .csv .parquet .mf4")],
+    data: Annotated[Path, argument("DATA", "Recording of a programme: .csv .parquet .mf4", callback=present)],
     other: Annotated[
-        Path | None, argument("[DATA2]", "Recording of another lining, compared with it")
+        Path | None, argument("[DATA2]", "Recording of another lining, compared with it", callback=present)
     ] = None,
     out: Annotated[Path | None, option("REPORT.html", "Page to write, with the charts")] = None,
     columns: Columns = None,

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakelab.cli.arguments import Columns
+from brakelab.cli.arguments import Columns, present
 from ecu.arguments import Commands, Config, Map, argument, flag, option
 
 app = Commands(help="Identify models from your own measurements.", no_args_is_help=True)
@@ -17,7 +17,8 @@ def _identify() -> None:
 @app.command()
 def friction(
     data: Annotated[
-        list[Path], argument("DATA", "Recordings of one brake on a dynamometer: .csv .parquet .mf4")
+        list[Path],
+        argument("DATA", "Recordings of one brake on a dynamometer: .csv .parquet .mf4", callback=present),
     ],
     out: Annotated[Path, option("BRAKE.toml", "Lining file to write, for the simulated vehicle")],
     columns: Columns = None,
@@ -45,7 +46,8 @@ def friction(
 @app.command()
 def wear(
     measured: Annotated[
-        list[Path], argument("MANIFEST.csv", "Table of blocks; with --from-logs results of drives")
+        list[Path],
+        argument("MANIFEST.csv", "Table of blocks; with --from-logs results of drives", callback=present),
     ],
     config: Config,
     out: Annotated[Path, option("CAR.toml", "CONFIG to write, CAR.md beside it; or BLOCKS.csv")],
@@ -69,7 +71,9 @@ def wear(
 
 @app.command()
 def dust(
-    manifest: Annotated[Path, argument("MANIFEST.csv", "Trips with a particle counter: trip, file, test")],
+    manifest: Annotated[
+        Path, argument("MANIFEST.csv", "Trips with a particle counter: trip, file, test", callback=present)
+    ],
     config: Config,
     out: Annotated[Path, option("CAR.toml", "CONFIG to write, CAR.md beside it; or RUN.md")],
     axle: Annotated[str, option("AXLE", "Axle of the brakes: front or rear")] = "front",
@@ -87,7 +91,10 @@ def dust(
 
 @app.command()
 def thermal(
-    logs: Annotated[list[Path], argument("LOG", "Drives with disc_temperature_measured_*, any log format")],
+    logs: Annotated[
+        list[Path],
+        argument("LOG", "Drives with disc_temperature_measured_*, any log format", callback=present),
+    ],
     config: Config,
     out: Annotated[Path, option("CAR.toml", "CONFIG to write, CAR.md and CAR.svg beside it")],
     map: Map = None,
@@ -100,7 +107,9 @@ def thermal(
 
 @app.command()
 def vehicle(
-    drives: Annotated[list[Path], argument("DRIVE", "Logs (with --map) or files of decoded signals")],
+    drives: Annotated[
+        list[Path], argument("DRIVE", "Logs (with --map) or files of decoded signals", callback=present)
+    ],
     config: Config,
     out: Annotated[Path, option("CAR.toml", "CONFIG to write, with a page CAR.md beside it")],
     map: Map = None,

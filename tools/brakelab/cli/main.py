@@ -6,7 +6,7 @@ from typing import Annotated
 
 from typer import Option
 
-from brakelab.cli.arguments import Plant, Scenario, Seed
+from brakelab.cli.arguments import Plant, Scenario, Seed, present
 from brakelab.cli.bench import HELP as BENCH_HELP
 from brakelab.cli.bench import bench
 from brakelab.cli.dynamometer import app as lab_app
@@ -181,7 +181,12 @@ def replay(
 @app.command()
 def play(
     log: Annotated[
-        Path, argument("LOG", "Log of frames (.log .asc .blf .trc .mf4) or signals (.mf4 .parquet .csv)")
+        Path,
+        argument(
+            "LOG",
+            "Log of frames (.log .asc .blf .trc .mf4) or signals (.mf4 .parquet .csv)",
+            callback=present,
+        ),
     ],
     interface: Interface,
     channel: Channel,

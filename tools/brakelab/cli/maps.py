@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
+from brakelab.cli.arguments import present
 from ecu.arguments import CONFIG_OPTION, MAP_OPTION, Commands, argument, option
 
 app = Commands(help="Make signal maps for other CAN databases and signal files.", no_args_is_help=True)
@@ -10,7 +11,7 @@ app = Commands(help="Make signal maps for other CAN databases and signal files."
 
 @app.command()
 def suggest(
-    log: Annotated[Path, argument("LOG", "Recorded drive")],
+    log: Annotated[Path, argument("LOG", "Recorded drive", callback=present)],
     dbc: Annotated[
         Path | None, option("DB", "CAN database of the car: DBC, KCD, SYM, ARXML; none for a signal file")
     ] = None,
@@ -25,7 +26,7 @@ def suggest(
 
 @app.command()
 def check(
-    log: Annotated[Path, argument("LOG", "Recorded drive")],
+    log: Annotated[Path, argument("LOG", "Recorded drive", callback=present)],
     map: Annotated[Path, MAP_OPTION],
     config: Annotated[Path | None, CONFIG_OPTION] = None,
     out: Annotated[

@@ -10,6 +10,7 @@ from typing import Final
 from brakelab.logs.csv_header import split_title
 from brakelab.logs.workbook import MAGIC, sheet_rows
 from ecu.errors import UserError
+from ecu.settings.resources import regular
 from ecu.settings.toml_file import read_toml
 
 NAMES: Final = ("file", "block", "trip", "test", "programme", "road_energy")
@@ -40,8 +41,7 @@ def read_manifest(path: Path, given: Path | None = None) -> list[tuple[int, dict
     Raises:
         UserError: it cannot be read, lacks a name that is stated, or has another unit.
     """
-    if path.exists() and not path.is_file():
-        raise UserError(str(path), "", "is no regular file; give a manifest as CSV or .xlsx")
+    regular(path, "a manifest as CSV or .xlsx")
     try:
         text = path.read_bytes()
     except OSError as error:

@@ -18,6 +18,7 @@ from brakelab.logs.text_log import is_packed
 from brakelab.logs.trc import read_trc
 from ecu.contract.records import RecordArray
 from ecu.errors import UserError
+from ecu.settings.resources import regular
 
 FORMATS: Final = (
     "candump .log, Vector .asc and .blf, PEAK .trc (text also with .gz), MDF4 .mf4 of frames or channels, "
@@ -57,8 +58,7 @@ def format_of(path: Path) -> str:
     suffixes = [suffix.lower() for suffix in path.suffixes]
     packed_name = suffixes[-1:] == [".gz"]
     named = "".join(suffixes[-2:-1] if packed_name else suffixes[-1:])
-    if path.exists() and not path.is_file():
-        raise UserError(str(path), "", "is no regular file; give a log, or write it to one first")
+    regular(path, "a log, or write it to one first")
     try:
         packed = is_packed(path)
         with path.open("rb") as plain:

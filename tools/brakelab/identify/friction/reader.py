@@ -21,6 +21,7 @@ from brakelab.identify.units import UNITS, ZEROS
 from brakelab.logs.csv_rows import csv_rows
 from brakelab.logs.log_quality import Damage
 from ecu.errors import UserError
+from ecu.settings.resources import regular
 
 Places = NDArray[np.int64]
 Labels = NDArray[np.str_]
@@ -53,8 +54,7 @@ def read_recording(path: Path, columns: Path | None = None, known: Columns | Non
     Raises:
         UserError: a file, a column or a unit is missing or wrong, or too few rows are whole; one line.
     """
-    if not path.is_file():
-        raise UserError(str(path), "", "no such file")
+    regular(path, "a recording as CSV, Parquet or MDF4")
     if path.suffix.lower() not in PLACES:
         raise UserError(str(path), "", f"ends in none of {' '.join(PLACES)}; export it as CSV")
     beside = columns or path.with_suffix(".toml")

@@ -25,9 +25,6 @@ def identify_vehicle(drives: Sequence[Path], config: Path, map: Path | None, clo
     page, own_map = out.with_suffix(".md"), out.with_name(f"{out.stem}-map.toml")
     written = [out, page, page.with_suffix(".svg"), *([own_map] if map else [])]
     check_outputs(out, written, [*drives, *config_files(config), *([map] if map else [])], toml=True)
-    for drive in drives:
-        if not drive.exists():
-            raise UserError(str(drive), "", "no such file; give a log or a file of signals")
     params = new_params(start)
     found = identify(read_drives(drives, params, map), params, closed)
     names = [drive.name for drive in drives]

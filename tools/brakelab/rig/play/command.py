@@ -23,6 +23,7 @@ from ecu.contract.records import FRAME_FD, RecordArray
 from ecu.errors import UserError
 from ecu.output import give, say
 from ecu.runtime.clock import Histogram, TimeSource, system_time
+from ecu.settings.resources import regular
 
 SPEEDS: Final = (0.1, 20.0)
 LEAD_NS: Final = 10_000_000
@@ -90,8 +91,7 @@ def play(log: Path, interface: str, channel: str, map: Path | None, speed: float
     least, most = SPEEDS
     if not least <= speed <= most:
         raise UserError("--speed", f"{speed:g}", f"give a factor from {least:g} to {most:g}; 1 is real time")
-    if not log.exists():
-        raise UserError(str(log), "", "no such file; give an existing log")
+    regular(log, "an existing log")
     if map and (line := check_map(map, announced(load_source(map)), log)):
         say(line)
     for number in (signal.SIGINT, signal.SIGTERM):
