@@ -29,7 +29,7 @@ _SPELLINGS: Final = {
     "": "-", "1": "-", "sed": "-", "unitless": "-", "none": "-",
     "kph": "km/h", "kmh": "km/h", "kmph": "km/h", "km/hr": "km/h", "kilometerperhour": "km/h",
     "mi/h": "mph", "m/sec": "m/s", "mps": "m/s", "meterpersecon": "m/s", "knots": "kn", "kt": "kn",
-    "degree": "deg", "degrees": "deg", "°": "deg", "degreofarc": "deg",
+    "degree": "deg", "degrees": "deg", "°": "deg", "grad": "deg", "grad/s": "deg/s", "degreofarc": "deg",
     "deg/sec": "deg/s", "degree/s": "deg/s", "degree/sec": "deg/s", "degrees/s": "deg/s",
     "degrees/sec": "deg/s", "°/s": "deg/s", "°/sec": "deg/s", "dps": "deg/s", "degreofarcpersecon": "deg/s",
     "rad/sec": "rad/s", "1/min": "rpm", "r/min": "rpm", "u/min": "rpm", "min-1": "rpm", "minutinver": "rpm",

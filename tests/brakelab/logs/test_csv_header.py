@@ -48,6 +48,13 @@ def test_the_table_of_a_program_is_found(
             1,
         ),
         ("t,p\n0,\n1,2\n2,\n", ["t", "p"], ["", ""], 1),
+        (
+            "Zeit in ms;Druck in bar;Gang in use\n" + ROWS.replace(",", ";").replace("\n", ";1\n"),
+            ["Zeit", "Druck", "Gang in use"],
+            ["ms", "bar", ""],
+            1,
+        ),
+        ("\"('t', 's')\",\"('v', 'km/h')\"\n" + ROWS, ["t", "v"], ["s", "km/h"], 1),
     ],
 )
 def test_shapes(text: str, names: list[str], units: list[str], lines: int, tmp_path: Path) -> None:

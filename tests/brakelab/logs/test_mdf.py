@@ -127,6 +127,7 @@ def test_what_is_wrong_with_channels_gives_one_line(tmp_path: Path) -> None:
         ([Signal(t, t, name="speed")], "columns: no known input among t, speed"),
         ([Signal(t, t, name=name), Signal(t, t, name=name)], f"{name}: stands in this file twice"),
         ([Signal(falling, falling, name=name)], "group 0, record 10: time falls to 0.05 s"),
+        ([Signal(t, np.floor(100 * t / 4), name=name)], "group 0, record 0: from here on 15 of 20 rows have"),
         ([Signal(t, t * 1e6, name=name)], "t: t is in seconds, but the rows are 10000 s apart"),
     ]
     for signals, line in cases:

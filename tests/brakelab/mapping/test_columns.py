@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from brakelab.logs.column_map import read_column_map
+from brakelab.logs.csv_header import split_title
 from ecu import cli
 
 RADIUS, TRACK, GRAVITY = 0.33, 1.55, 9.80665
@@ -39,6 +40,13 @@ def write_drive(path: Path, seconds: float = 80.0, head: str = "") -> Path:
     text = "\n".join(",".join(f"{cell:.4f}" for cell in row) for row in rows)
     path.write_text(f"{head}{','.join(columns)}\n{','.join(units)}\n\n{text}\n")
     return path
+
+
+def with_units(log: Path) -> pd.DataFrame:
+    """Return the drive of `write_drive` with its units behind the names."""
+    names, units, *_ = log.read_text().splitlines()
+    titles = [f"{name} [{unit}]" for name, unit in zip(names.split(","), units.split(","), strict=True)]
+    return pd.read_csv(log, skiprows=[1]).set_axis(titles, axis=1)
 
 
 def test_suggest_check_and_replay(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -123,10 +131,8 @@ def test_a_time_that_is_not_in_seconds_is_refused_or_read_by_its_unit(
 
 def test_parquet_of_a_csv_file_gets_its_map(tmp_path: Path) -> None:
     log = write_drive(tmp_path / "aim.csv")
-    names, units, *_ = log.read_text().splitlines()
-    titles = [f"{name} [{unit}]" for name, unit in zip(names.split(","), units.split(","), strict=True)]
     made, maps = tmp_path / "aim.parquet", [tmp_path / "csv.toml", tmp_path / "parquet.toml"]
-    pd.read_csv(log, skiprows=[1]).set_axis(titles, axis=1).to_parquet(made)
+    with_units(log).to_parquet(made)
     for one, out in zip((log, made), maps, strict=True):
         assert cli.main(["map", "suggest", str(one), "--out", str(out)]) == 0
     csv, parquet = (
@@ -165,7 +171,7 @@ def test_a_time_of_day_needs_no_unit(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert cli.main(["map", "suggest", str(log), "--out", str(out)]) == 0
     assert "time_unit" not in out.read_text("utf-8")
     assert cli.main(["map", "check", str(log), "--map", str(out)]) == 0
-    log.write_text("\n".join([head.replace("Time", "Zeit in s"), units, *rows, ""]))
+    log.write_text("\n".join([head.replace("Time", "Stoppuhr"), units, *rows, ""]))
     assert cli.main(["map", "suggest", str(log)]) == 2
     assert 'BrakePress; give that of time such a name, its unit in brackets: "time [s]"' in (
         capsys.readouterr().err
@@ -197,6 +203,55 @@ def test_damage_and_columns_that_stand_twice_are_reported(
 def test_a_drive_of_a_few_rows_is_too_short(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["map", "suggest", str(write_drive(tmp_path / "aim.csv", seconds=0.3))]) == 2
     assert ", of which none has 20 numbers at times of their own" in capsys.readouterr().err
+
+
+WRITTEN = {
+    "capitals": lambda name, unit: f"{name.replace('Spd_', 'Speed').upper()} [{unit}]",
+    "words": lambda name, unit: f"{name} in {unit}",
+    "German": lambda name, unit: f"{name} [{unit.replace('deg/s', 'Grad/s')}]",
+    "two levels": lambda name, unit: (name, unit),
+}
+
+
+@pytest.mark.parametrize("kind", [".parquet", ".csv"])
+@pytest.mark.parametrize("written", WRITTEN.values(), ids=WRITTEN)
+def test_names_and_units_as_others_write_them(
+    tmp_path: Path, kind: str, written: Callable[[str, str], str | tuple[str, str]]
+) -> None:
+    table = with_units(write_drive(tmp_path / "aim.csv"))
+    heads = [written(*split_title(title)) for title in table.columns]
+    table.columns = pd.MultiIndex.from_tuples(heads) if isinstance(heads[0], tuple) else pd.Index(heads)
+    made, out = tmp_path / f"drive{kind}", tmp_path / "map.toml"
+    table.to_parquet(made) if kind == ".parquet" else table.to_csv(made, index=False)
+    assert cli.main(["map", "suggest", str(made), "--out", str(out)]) == 0
+    found = read_column_map(out).content.inputs
+    assert {f"wheel_speed_{corner}" for corner in ("fl", "fr", "rl", "rr")} < set(found)
+    assert (found["accel_x"].factor, found["yaw_rate"].factor) == (-1.0, -1.0)
+    assert "CHECK" not in out.read_text("utf-8")
+
+
+SPOILT = {
+    "t: time falls by ": lambda table: pd.concat(
+        [table[:1000], table[1000:1200].sample(frac=1.0, random_state=1), table[1200:]]
+    ),
+    "row 900, InlineAcc: infinite value": lambda table: table.assign(
+        **{"InlineAcc [g]": table["InlineAcc [g]"].where(table.index != 900, np.inf)}
+    ),
+}
+
+
+@pytest.mark.parametrize(("says", "spoil"), SPOILT.items(), ids=["order", "infinite"])
+def test_nothing_is_proposed_for_a_file_that_replay_refuses(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    says: str,
+    spoil: Callable[[pd.DataFrame], pd.DataFrame],
+) -> None:
+    made, out = tmp_path / "spoilt.parquet", tmp_path / "map.toml"
+    spoil(with_units(write_drive(tmp_path / "aim.csv"))).to_parquet(made, index=False)
+    assert cli.main(["map", "suggest", str(made), "--out", str(out)]) == 2
+    assert says in capsys.readouterr().err
+    assert not out.exists()
 
 
 def test_time_alone_is_no_drive(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,6 +11,8 @@ import re
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from brakelab.logs.column_map import seconds_of
+from ecu.bus.units import CONVERSIONS, spelled
 from ecu.errors import UserError
 
 HEAD_BYTES: Final = 1 << 18
@@ -24,6 +26,9 @@ _NUMBER: Final = re.compile(
 )
 """A cell of a table of numbers, or a time of day."""
 _BRACKETS: Final = re.compile(r"(.*?\S)\s*[\[(]([^\])]*)[\])]")
+_LEVELS: Final = re.compile(r"\('([^']*)', '([^']*)'\)")
+"""Heading of two levels as pandas writes it to Parquet."""
+_WORDS: Final = re.compile(r"(.*\S) in (\S+)", re.IGNORECASE)
 
 Row = list[str]
 
@@ -117,13 +122,23 @@ def _above(rows: list[Row], first: int) -> list[Row]:
 
 
 def split_title(title: str) -> tuple[str, str]:
-    """Return name and unit of `Speed [km/h]`, `Speed (km/h)` or `"Speed"|"km/h"|0|200|10`."""
+    """Return name and unit of `Speed [km/h]`, `Speed (km/h)`, `Speed in km/h`, `('Speed', 'km/h')` or
+    `"Speed"|"km/h"|0|200|10`."""
     title = title.strip()
+    if levels := _LEVELS.fullmatch(title):
+        return levels[1], levels[2]
+    if (spoken := _WORDS.fullmatch(title)) and _is_unit(spoken[2]):
+        return spoken[1], spoken[2]
     if title.count("|") >= 2:
         name, unit = (part.strip(' "') for part in title.split("|")[:2])
         return name, unit
     found = _BRACKETS.fullmatch(title)
     return (found[1], found[2]) if found else (title, "")
+
+
+def _is_unit(word: str) -> bool:
+    known = any(spelled(word) in units for units in CONVERSIONS.values()) and spelled(word) != "-"
+    return known or seconds_of(word) is not None
 
 
 def distinct(names: list[str]) -> list[str]:

@@ -13,6 +13,7 @@ import pyarrow as pa
 
 from brakelab.logs.log_quality import Damage
 from brakelab.logs.mdf import Column, Measurement, in_step
+from brakelab.logs.sample_block import refuse_one_instant
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import INPUT
 from ecu.errors import UserError
@@ -123,6 +124,7 @@ def _samples(
         if len(lost):
             damage.note_damage(len(lost), f"group {group}, record {first + int(lost[0])} (no time)")
             block = block[np.isfinite(block["t"])]
+        refuse_one_instant(path, f"group {group}, record {first}", block["t"], block["values"])
         steps = np.diff(block["t"], prepend=last)
         damage.stamps_repeated += int(np.count_nonzero(steps == 0))
         falling = np.flatnonzero(steps < 0)

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from brakelab.arrays import arrow_array, median
 from brakelab.logs.log_quality import MAX_JUMP_NS, STEP_NS, SignalQuality
+from brakelab.logs.sample_block import FEW_ROWS
 from brakelab.logs.signal_batches import Batch, is_csv
 
-FEW_ROWS: Final = 10  # too few to judge their distance
 _SET_S: Final = 1e-9 * STEP_NS
 _JUMP_S: Final = 1e-9 * MAX_JUMP_NS
 _DAY_S: Final = 86_400.0

@@ -7,7 +7,7 @@ input at one instant the last counts.
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import pyarrow as pa
@@ -17,8 +17,8 @@ from brakelab.arrays import arrow_array, median
 from brakelab.logs.column_map import ColumnUse, FileUse, MappedFile
 from brakelab.logs.lag import without_lags
 from brakelab.logs.log_quality import MAX_JUMP_NS, SignalQuality
-from brakelab.logs.row_order import FEW_ROWS, in_order, place_of
-from brakelab.logs.sample_block import SampleBlock
+from brakelab.logs.row_order import in_order, place_of
+from brakelab.logs.sample_block import FEW_ROWS, SampleBlock, refuse_one_instant
 from brakelab.logs.signal_batches import Batch, is_csv, mapped_batches, plain_batches
 from ecu.bus.freshness import input_freshness
 from ecu.contract.records import RecordArray
@@ -146,26 +146,6 @@ def check_seconds(path: Path, name: str, t: NDArray[np.float64], or_else: str) -
     if found:
         remedy = f"convert it from ms, us or ns, or give every sample{or_else}"
         raise UserError(str(path), name, f"{name} is in seconds, but {found}; {remedy}")
-
-
-def refuse_one_instant(path: Path, place: str, t: NDArray[Any], values: NDArray[np.float64]) -> None:
-    """Refuse rows of which most share their time with the one before and differ from it: one would count.
-
-    Args:
-        path: of the file.
-        place: of the rows in it.
-        t: of the rows, shape (rows,).
-        values: of their cells, NaN where there is none, shape (rows, columns).
-
-    Raises:
-        UserError: they do.
-    """
-    before, here = values[:-1], values[1:]
-    differ = ((here < before) | (here > before)).any(axis=1)
-    lost = int(np.count_nonzero(differ & (np.diff(t) == 0)))
-    if len(t) > FEW_ROWS and 2 * lost > len(t):
-        found = f"from here on {lost} of {len(t)} rows have the time of the row before and other values"
-        raise UserError(str(path), place, f"{found}; give time in steps as fine as the rows, in ms")
 
 
 def _check_span(

@@ -12,8 +12,9 @@ from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.physics.lags import RADIUS, lags
 from brakelab.logs.physics.samples import SAMPLED, Car, InputSeries
 from brakelab.logs.row_order import in_order, numbers
+from brakelab.logs.sample_block import refuse_one_instant
 from brakelab.logs.signal_batches import Columns, columns_of, rows_of, time_of
-from brakelab.logs.signal_file import check_seconds, refuse_one_instant
+from brakelab.logs.signal_file import check_seconds
 from brakelab.mapping.map_text import input_lines, needs_radius, radius_line
 from brakelab.mapping.motion import Found, Motion, contract_unit
 from brakelab.mapping.names import converts

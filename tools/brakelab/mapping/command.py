@@ -2,6 +2,7 @@
 
 import math
 import os
+import tomllib
 from pathlib import Path
 from typing import Final
 
@@ -10,9 +11,10 @@ from cantools.database import Database
 from rich.console import Console
 from rich.table import Table
 
-from brakelab.logs.column_map import read_column_map
+from brakelab.logs.column_map import ColumnMap, MappedFile
 from brakelab.logs.formats import kind_of, read_frames
 from brakelab.logs.physics.samples import ANY_CAR, Car, car_of
+from brakelab.logs.signal_file import read_signals
 from brakelab.mapping.columns import column_map_text, read_column_series, with_lags
 from brakelab.mapping.drive_torque import motors
 from brakelab.mapping.map_text import input_lines, needs_radius, radius_line
@@ -130,9 +132,18 @@ def _suggest_columns(log: Path, out: Path | None, car: Car) -> None:
     _show(found, motion.drives, others, [])
     after = {one.target: timeout(one) for one in found}
     text = column_map_text(log, columns, found, after, car) + "".join(f"# {one}\n" for one in others)
+    _read_by(text, log, max(float(one.t[-1]) for one in series))
     _give(log, text, out)
-    if out is not None:
-        read_column_map(out)
+
+
+def _read_by(text: str, log: Path, seconds: float) -> None:
+    """Read the beginning of a signal file by a map. Raises UserError where a replay would refuse it."""
+    mapped = MappedFile(log.with_suffix(".toml"), ColumnMap.model_validate(tomllib.loads(text)))
+    begin = None
+    for block in read_signals(log, Findings(log).signals, mapped):
+        begin = float(block.t[0]) if begin is None else begin
+        if block.t[-1] > begin + seconds:
+            break
 
 
 def _refuse_unitless(where: Path, wheel: Series, remedy: str, car: Car) -> None:

@@ -1,6 +1,8 @@
 """Hints in the names and units of signals."""
 
 import re
+from functools import cache
+from itertools import chain
 from typing import Final
 
 from ecu.bus.units import CONVERSIONS, spelled
@@ -85,10 +87,35 @@ COUNTS: Final = ("", "v", "mv", "volt", "%", "-", "raw", "count", "counts")
 """Units of a pressure that leave its scale open: a sensor's own voltage, a share of its range."""
 
 
+_SPOKEN: Final = frozenset(
+    word
+    for word in (*chain(*WORDS.values()), *chain(*AGAINST.values()), "front", "rear", "left", "right")
+    if word.isalpha() and len(word) > 2
+)
+_ENDS: Final = frozenset(
+    ("x", "y", *(word for spelt in _CORNERS.values() for word in spelt if len(word) == 2))
+)
+"""Short words that stand only at the end of a run."""
+
+
 def words(name: str) -> list[str]:
-    """Return the words of a signal's name in lower case: `WhlFl_W_Meas` gives whl, fl, w, meas."""
+    """Return the words of a signal's name in lower case: `WhlFl_W_Meas` gives whl, fl, w, meas.
+
+    A run of letters is cut where known words make it up: `WHEELSPEEDFL` gives wheel, speed, fl.
+    """
     parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name.replace("_", " "))
-    return [part.lower() for part in parts]
+    return [word for part in parts for word in _cut(part.lower()) or [part.lower()]]
+
+
+@cache
+def _cut(run: str) -> tuple[str, ...]:
+    """Return the known words that make up a run, the first as long as it can be; empty: they do not."""
+    if run in _SPOKEN or run in _ENDS:
+        return (run,)
+    for length in range(len(run) - 1, 2, -1):
+        if run[:length] in _SPOKEN and (rest := _cut(run[length:])):
+            return run[:length], *rest
+    return ()
 
 
 def corner_of(name: str) -> tuple[str, str]:
