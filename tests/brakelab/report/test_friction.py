@@ -39,12 +39,13 @@ def test_means_follow_what_was_observed() -> None:
     assert set(plots) == {
         f"{of}-{axle}" for of in ("disc_temperature", "vehicle_speed") for axle in ("front", "rear")
     }
-    mean, true = lines(plots["disc_temperature-front"])
+    low, high, mean, true = lines(plots["disc_temperature-front"])
+    np.testing.assert_allclose(high["y"] - low["y"], 4.0 * 0.02, atol=1e-9)
     assert mean["x"].min() > 140.0
     assert mean["x"].max() < 240.0
     for line in (mean, true):
         np.testing.assert_allclose(line["y"], 0.5 - 0.001 * (line["x"] - 100.0), atol=1e-9)
-    (speed,) = lines(plots_of_friction(drive((7.0, 12.0)), None, [STOP])["vehicle_speed-rear"])
+    *_, speed = lines(plots_of_friction(drive((7.0, 12.0)), None, [STOP])["vehicle_speed-rear"])
     assert speed["x"].max() == pytest.approx(24.0 * 3.6, rel=0.05)
 
 

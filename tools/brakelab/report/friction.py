@@ -10,7 +10,7 @@ from brakelab.report.accuracy import AXLES
 from brakelab.report.brakings import Braking, inside_any
 from brakelab.report.cloud import binned, draw_dots, draw_true_mean, thinned
 from brakelab.report.drive import DriveResult
-from brakelab.report.look import INK, LEFT, RIGHT, free_figure
+from brakelab.report.look import BOUND, INK, LEFT, RIGHT, free_figure
 from ecu.contract.signals import CORNERS, OBSERVING
 
 POINTS: Final = 600
@@ -75,10 +75,10 @@ def _plot(
     # Points and means set the range: a wide band would compress them.
     shown = list(plot.renderers)
     if len(centre) > 1:
-        plot.varea(
-            centre, mean - spread, mean + spread, fill_color=INK, fill_alpha=0.1, legend_label="mean, ±2σ"
-        )
-        shown.append(plot.line(centre, mean, line_color=INK, line_width=1.6, legend_label="mean, ±2σ"))
+        look: dict[str, Any] = {"line_color": INK, "legend_label": "mean, ±2σ thin"}
+        for bound in (mean - spread, mean + spread):
+            plot.line(centre, bound, **look, **BOUND)
+        shown.append(plot.line(centre, mean, line_width=1.6, **look))
         if true is not None:
             shown += draw_true_mean(plot, *binned(at, true[place, side], BINS))
     plot.y_range.update(renderers=shown, range_padding=0.2, min_interval=_LEAST_SPAN)

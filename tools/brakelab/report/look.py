@@ -45,6 +45,8 @@ DARK: Final = {
     STAGE_COLOURS[4]: "#a3acb9",
 }
 
+BOUND: Final = {"line_width": 0.7, "line_alpha": 0.6}
+"""Style of the ends of a band: filled, it would hide the grid and the other wheel's."""
 TIME: Final = "Time [s]"
 TOOLS: Final = "xpan,xbox_zoom,box_zoom,xwheel_zoom,undo,reset,save"
 

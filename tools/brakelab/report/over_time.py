@@ -1,6 +1,7 @@
 """Linked plots over a drive: speed, deceleration, friction, pressures, discs, K_f and modes."""
 
 from collections.abc import Iterator
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from brakelab.report.brakings import Braking, inside_any
 from brakelab.report.downsample import Buckets, buckets, drawn
 from brakelab.report.drive import DriveResult
 from brakelab.report.look import (
+    BOUND,
     DEMAND,
     ESTIMATE,
     INK,
@@ -145,22 +147,21 @@ def _estimate(
     plot = time_figure(label, span, what.least_span)
     sides = list(zip(corners, ("left", "right"), (LEFT, RIGHT), strict=True))
     name = what.column
-    for corner, _, colour in sides:
-        low, high = f"{name}_low_{corner}", f"{name}_high_{corner}"
-        if low in source.column_names:
-            plot.varea("t", low, high, source=source, fill_color=colour, fill_alpha=0.16)
+    for (corner, side, colour), bound in product(sides, ("low", "high")):
+        draw_line(plot, source, f"{name}_{bound}_{corner}", f"{side}, ±2σ thin", colour, **BOUND)
     bands = len(plot.renderers)
     for corner, side, colour in sides:
-        draw_line(plot, source, f"{name}_{corner}", f"{side}, band ±2σ", colour)
+        draw_line(plot, source, f"{name}_{corner}", f"{side}, ±2σ thin", colour)
     for corner, side, _ in sides:
         dash = "dashed" if side == "left" else "dotted"
         draw_line(plot, source, f"{name}_true_{corner}", f"{side}, true", INK, line_dash=dash, line_width=1.3)
     # The lines set the range: a band that is briefly wide would compress everything.
     plot.y_range.update(renderers=plot.renderers[bands:], range_padding=0.5)
+    kinds = (("", ""), (" +2σ", "_high"), (" −2σ", "_low"), (" true", "_true"))
     rows = [
-        (f"{side}{kind.replace('_', ' ')}", f"{name}{kind}_{corner}", what.digits)
+        (f"{side}{said}", f"{name}{kind}_{corner}", what.digits)
         for corner, side, _ in sides
-        for kind in ("", "_true")
+        for said, kind in kinds
     ]
     _hover(plot, source, rows)
     return plot

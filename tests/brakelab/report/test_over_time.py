@@ -1,0 +1,32 @@
+"""Bands of the plots over time: thin lines that hide nothing and do not set the axis."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bokeh.models import HoverTool
+
+from brakelab.report.drive import DriveResult
+from brakelab.report.over_time import plots_over_time
+from ecu.contract.signals import CORNERS
+
+
+@pytest.mark.parametrize(("column", "plot"), [("mu_b", "friction-front"), ("disc_temperature", "disc-rear")])
+def test_a_wide_band_hides_nothing_and_compresses_nothing(column: str, plot: str, tmp_path: Path) -> None:
+    t = np.arange(0.0, 10.0, 0.01)
+    columns = {f"{column}_{corner}": 0.4 + 0.01 * t for corner in CORNERS}
+    columns |= {f"sigma_{column}_{corner}": np.full(len(t), 5.0) for corner in CORNERS}
+    drawn = plots_over_time(DriveResult(t, columns, {}), None, [])[plot]
+    glyphs = [type(one.glyph).__name__ for one in drawn.renderers]
+    assert glyphs == ["Line"] * 6
+    assert {one.glyph.y.split("_")[-2] for one in drawn.y_range.renderers} <= {"b", "temperature"}
+    tips = next(tool for tool in drawn.tools if isinstance(tool, HoverTool)).tooltips
+    assert [label for label, _ in tips] == [
+        "time",
+        "left",
+        "left +2σ",
+        "left −2σ",
+        "right",
+        "right +2σ",
+        "right −2σ",
+    ]
