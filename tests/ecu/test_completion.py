@@ -57,7 +57,7 @@ def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
         ("brake-ecu bench ent", {"entries"}),
         ("brake-ecu lab run a", {"ams", "ak-master"}),
         ("brake-ecu lab run cpc --law S", {"SIM"}),
-        ("brake-ecu config ", {"check", "new", "schema"}),
+        ("brake-ecu config ", {"check", "new", "schema", "plant"}),
         ("brake-ecu replay a", set()),
     ],
 )

@@ -1,5 +1,6 @@
 """`map suggest`, `map check` and `replay` on a signal file of a logger: a drive with curves and brakings."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -258,6 +259,16 @@ def test_time_alone_is_no_drive(tmp_path: Path, capsys: pytest.CaptureFixture[st
     pd.DataFrame({"t": [0.0, 0.1, 0.2]}).to_parquet(tmp_path / "drive.parquet")
     assert cli.main(["map", "suggest", str(tmp_path / "drive.parquet")]) == 2
     assert "no speed by its name and unit among t, of which none" in capsys.readouterr().err
+
+
+def test_names_of_the_contract_need_no_map_but_a_t(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = write_drive(tmp_path / "aim.csv", seconds=40.0)
+    text = re.sub("WheelSpd_(..)", lambda found: f"wheel_speed_{found[1].lower()}", log.read_text())
+    log.write_text(text.replace("km/h", ""))
+    assert cli.main(["map", "suggest", str(log)]) == 2
+    assert "or call its time t: the contract's names have" in capsys.readouterr().err
 
 
 def test_wheel_speeds_without_a_unit_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

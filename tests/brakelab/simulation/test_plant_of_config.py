@@ -9,7 +9,8 @@ from brakelab.plant.description import load_plant, nominal
 from brakelab.simulation.closed_loop import new_loop, run
 from brakelab.simulation.plant_of_config import AS_CONFIG
 from brakelab.simulation.scenario import load_scenario
-from brakelab.simulation.scenario_car import other_car, with_draw, with_plant_for
+from brakelab.simulation.scenario_car import other_car, with_draw, with_plant, with_plant_for
+from ecu import cli
 from ecu.settings.config import Config, load_config
 from ecu.settings.hydraulics import Hydraulics
 from ecu.settings.resources import resource
@@ -62,3 +63,16 @@ def test_its_hydraulic_unit_is_the_configured_one(tmp_path: Path) -> None:
     assert car["build_up"] == pytest.approx([0.00075, 0.037, 0.15])
     assert car["release"] == pytest.approx([4 * 0.00021, 0.09, 0.015])
     assert (car["rise_limit"], car["fall_limit"]) == (80e5, 18000e5)
+
+
+def test_config_plant_writes_the_car_for_other_commands(tmp_path: Path) -> None:
+    car, out = tmp_path / "car.toml", tmp_path / "made" / "plant.toml"
+    car.write_text('include = "suv"\n[vehicle]\nmass = 1750.0\n')
+    words = ["config", "plant", str(car), "--out", str(out)]
+    for _ in range(2):  # it may renew what it wrote
+        assert cli.main(words) == 0
+    assert nominal(load_plant(out))[0]["mass"] == 1750.0
+    driven = with_plant(STOP, str(out))
+    assert other_car(driven, load_config(car)) == ""
+    assert cli.main(["config", "plant", str(car), "--out", str(car)]) == 2  # it reads this one
+    assert "1750" in car.read_text()

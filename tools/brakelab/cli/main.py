@@ -26,11 +26,13 @@ from ecu.arguments import (
     Observer,
     State,
     argument,
+    config_file,
     flag,
     option,
     scenario_file,
 )
-from ecu.completion import fitting, shipped
+from ecu.cli_config import app as config_app
+from ecu.completion import fitting, known, shipped
 from ecu.errors import UserError
 from ecu.output import wrote
 from ecu.settings.resources import SCENARIOS, resource
@@ -76,6 +78,25 @@ def simulate(
     from brakelab.rig.simulated import judge_simulated
 
     return judge_simulated(driven, seed)
+
+
+@config_app.command("plant")
+def config_plant(
+    config: Annotated[Path, argument("CONFIG", "Vehicle: file or name", parser=config_file)],
+    out: Annotated[Path, option("PLANT.toml", "File to write, linings.toml beside it")],
+    like: Annotated[
+        str,
+        option(
+            "PLANT",
+            "Car that has what CONFIG does not know",
+            autocompletion=known("suv", "suv14", "sedan", "lcv"),
+        ),
+    ] = "suv",
+) -> None:
+    """Write the simulated car of a configuration, for --plant."""
+    from brakelab.simulation.plant_of_config import plant_command
+
+    plant_command(config, like, out)
 
 
 @app.command()

@@ -17,7 +17,7 @@ from ecu.jit import kernel
 from ecu.output import say
 
 FEWEST_FRAMES = 20  # frames of a message
-MOST_NUMBERS = 20_000_000  # of a log that are looked at, within 1 GB of memory
+MOST_NUMBERS = 16_000_000  # of a log that are looked at, within 1 GB of memory
 PER_FRAME = 5
 MAGNITUDES = {"deg", "rad", "deg/s", "rad/s", "m/s^2", "g", "N m"}  # units of what has two sides
 T = TypeVar("T")

@@ -1,4 +1,4 @@
-"""A plant file of the car that CONFIG describes (`--plant as-config`).
+"""A plant file of the car that CONFIG describes (`config plant`, `--plant as-config`).
 
 Masses, lengths, wheels and brakes are CONFIG's; what it does not know (tyre curves, linings, discs, sensors)
 stays that of another car's file. Inertia goes with mass times wheelbase squared; motors, springs and dampers
@@ -12,9 +12,12 @@ from typing import Any, Final
 import numpy as np
 import tomlkit
 
+from brakelab.results.outputs import check_outputs
 from ecu.errors import UserError
-from ecu.settings.config import Config, new_params
+from ecu.output import argument, wrote
+from ecu.settings.config import Config, config_files, load_config, new_params
 from ecu.settings.hydraulics import Hydraulics
+from ecu.settings.resources import command_name, named
 
 AS_CONFIG: Final = "as-config"
 _BY_MASS: Final = {
@@ -27,13 +30,25 @@ _BY_MASS: Final = {
 }
 
 
-def write_plant(config: Config, base: Path, folder: Path) -> Path:
-    """Write CONFIG's car, made from the car `base`, and its linings below `folder`; return its file.
+def plant_command(config: Path, like: str, out: Path) -> None:
+    """Write the car of the file `config` as a plant, made from the car `like`, a file or a shipped name.
 
     Raises:
-        UserError: `base` cannot be read, or `folder` not be written.
+        UserError: a file cannot be read, or `out` or its linings not be written.
     """
-    out = folder / base.stem / f"{AS_CONFIG}.toml"
+    base, files = named(like, "config/plant"), (out, out.with_name("linings.toml"))
+    check_outputs(out, files, [base, *config_files(config)], toml=True)
+    write_plant(load_config(config), base, out)
+    car, made = argument(command_name(config)), argument(out)
+    wrote(*files, next=f"brake-ecu rig single --config {car} --plant {made} --lock-step")
+
+
+def write_plant(config: Config, base: Path, out: Path) -> Path:
+    """Write CONFIG's car, made from the car `base`, as `out` with its linings beside it; return `out`.
+
+    Raises:
+        UserError: `base` cannot be read, or `out` not be written.
+    """
     try:
         document = tomlkit.parse(base.read_text("utf-8-sig"))
         for table, values in _values(config, document).items():

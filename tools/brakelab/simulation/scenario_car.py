@@ -48,7 +48,8 @@ def with_plant_for(scenario: Scenario, plant: str | None, config: Config, folder
         UserError: the plant's file cannot be read, or `folder` not be written.
     """
     if plant == AS_CONFIG:
-        plant = str(write_plant(config, named(scenario.plant, "config/plant"), folder))
+        base = named(scenario.plant, "config/plant")
+        plant = str(write_plant(config, base, folder / base.stem / f"{AS_CONFIG}.toml"))
     return with_plant(scenario, plant)
 
 
