@@ -9,7 +9,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from brakelab.report.command import report
+from brakelab.report.drive import DriveResult
 from brakelab.report.look import DARK
+from brakelab.report.summary import facts
+from brakelab.simulation.closed_loop import START_NS
 from ecu.contract.signals import CORNERS
 from ecu.errors import UserError
 
@@ -210,6 +213,15 @@ def test_damage_gives_one_line(
 def test_place_that_cannot_be_written(drive_files: Files) -> None:
     with pytest.raises(UserError, match="choose another --out"):
         report(drive_files["result"], None, drive_files["result"] / "report.html")
+
+
+@pytest.mark.parametrize(
+    ("start_ns", "says"),
+    [(START_NS + 8_000_000, "simulated"), (START_NS - 1, "14 November 2023, 22:13:19 UTC"), (None, None)],
+)
+def test_a_simulated_drive_has_no_date(start_ns: int | None, says: str | None) -> None:
+    metadata = {} if start_ns is None else {"start_time_ns": str(start_ns)}
+    assert dict(facts(DriveResult(np.arange(2.0), {}, metadata))).get("Start") == says
 
 
 def test_a_page_has_the_name_of_one(drive_files: Files, tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 import math
 from datetime import UTC, datetime
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,10 @@ _DEMAND_ERROR = 0.1
 _PREDICTION_ERROR = 0.1
 
 
+SIMULATED_S: Final = 1_700_000_000
+"""Date at which every simulated drive begins, which is none of a drive: `closed_loop.START_NS`."""
+
+
 class FaultSeen(NamedTuple):
     """A row of the table of faults; times in s."""
 
@@ -35,7 +39,9 @@ def facts(drive: DriveResult) -> list[tuple[str, str]]:
     """Return label and value of each statement of the result on its origin."""
     start = start_ns(drive)
     when = ""
-    if start is not None:
+    if start is not None and start // 10**9 == SIMULATED_S:
+        when = "simulated"
+    elif start is not None:
         when = datetime.fromtimestamp(start // 10**9, UTC).strftime("%d %B %Y, %H:%M:%S UTC")
     rows = [
         ("Vehicle", drive.metadata.get("vehicle", "")),
