@@ -1,6 +1,8 @@
 """Commands as functions: what they give is what the command line writes, and nothing is printed."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -109,3 +111,22 @@ def test_a_map_is_checked_as_by_the_command(drive: Simulation, capsys: pytest.Ca
     turned = {"inputs": inputs | {"accel_x": {"column": "accel_x", "factor": -1.0}}}
     wrong = check_map(drive.inputs.to_pandas(), turned, config="suv")["wrong"]
     assert [line for line in wrong if line.startswith("accel_x: turned")]
+
+
+@pytest.mark.parametrize("name", ["lab look", "lab report", "identify friction"])
+def test_a_command_says_that_it_works_while_what_it_needs_is_imported(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SciPy takes a second; where a drive is read there is a bar of its own."""
+    said: list[str] = []
+
+    @contextmanager
+    def bar(text: str, total: float | None) -> Iterator[None]:
+        said.append(text)
+        yield
+
+    monkeypatch.setattr("brakelab.results.progress.progress_bar", bar)
+    (tmp_path / "data.csv").write_text("t\n")
+    options = ["--out", str(tmp_path / "out.toml")] if "identify" in name else []
+    assert cli.main([*name.split(), str(tmp_path / "data.csv"), *options]) == 2
+    assert said == [name]

@@ -51,8 +51,11 @@ def run(
     ] = None,
 ) -> None:
     """Run a programme on the dynamometer. Record at 200 Hz; the pad follows none of the friction laws."""
-    from brakelab.identify.friction import command
+    from brakelab.results.progress import progress_bar
     from ecu.compiling import report_compiling
+
+    with progress_bar("lab run", None):
+        from brakelab.identify.friction import command
 
     with report_compiling():
         command.run(programme, brake, seed, out, law, linings)
@@ -66,7 +69,10 @@ def look(
     columns: Columns = None,
 ) -> None:
     """Analyse a recording. Show principal components, shares of variance, effect of the previous stop."""
-    from brakelab.identify.friction import command
+    from brakelab.results.progress import progress_bar
+
+    with progress_bar("lab look", None):  # SciPy alone takes a second
+        from brakelab.identify.friction import command
 
     command.look(data, columns)
 
@@ -89,7 +95,10 @@ def report(
     ] = None,
 ) -> int:
     """Show friction section by section, as for AK-Master (SAE J2522). Compare two linings."""
-    from brakelab.identify.friction.report import report as report_of
+    from brakelab.results.progress import progress_bar
+
+    with progress_bar("lab report", None):
+        from brakelab.identify.friction.report import report as report_of
 
     return report_of(data, other, columns, programme, out)
 

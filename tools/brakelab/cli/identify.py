@@ -36,8 +36,11 @@ def friction(
     ] = None,
 ) -> None:
     """Identify a friction law from dynamometer recordings. Fit all laws, choose one, state its limits."""
-    from brakelab.identify.friction import command
+    from brakelab.results.progress import progress_bar
     from ecu.compiling import report_compiling
+
+    with progress_bar("identify friction", None):  # SciPy alone takes a second
+        from brakelab.identify.friction import command
 
     with report_compiling():
         command.friction(data, columns, held_out, out, profile, tuple(own or ()), discover)
@@ -100,7 +103,10 @@ def thermal(
     map: Map = None,
 ) -> None:
     """Identify the disc temperature model, dry and wet. Write a CONFIG."""
-    from brakelab.identify.thermal import command
+    from brakelab.results.progress import progress_bar
+
+    with progress_bar("identify thermal", None):
+        from brakelab.identify.thermal import command
 
     command.identify_thermal(logs, config, map, out)
 
@@ -118,6 +124,9 @@ def vehicle(
     ] = False,
 ) -> None:
     """Identify radii, mass, drag, tyres and brakes of a car. Write a CONFIG."""
-    from brakelab.identify.vehicle import command
+    from brakelab.results.progress import progress_bar
+
+    with progress_bar("identify vehicle", None):
+        from brakelab.identify.vehicle import command
 
     command.identify_vehicle(drives, config, map, closed, out)
