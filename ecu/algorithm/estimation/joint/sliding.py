@@ -52,14 +52,27 @@ def wheel_slides(params: Record, state: Record, i: int) -> bool:
 
 
 @kernel
+def _count_wheels(params: Record, state: Record, speed: float) -> tuple[int, int]:
+    """Return how many of the wheels that were read roll at a speed [m/s], and how many do not."""
+    rolling = slipping = 0
+    for i in range(4):
+        if state.window.omega_samples[i] > 0:
+            rolled = state.window.omega[i] * params.wheel_radius[i]
+            slips = 1 if _beyond(rolled, speed, AGREEING) else 0
+            rolling, slipping = rolling + 1 - slips, slipping + slips
+    return rolling, slipping
+
+
+@kernel
 def wheels_agree(params: Record, state: Record, speed: float) -> bool:
     """Return whether at least three wheels roll at a speed [m/s]."""
-    count = 0
-    for i in range(4):
-        rolled = state.window.omega[i] * params.wheel_radius[i]
-        if state.window.omega_samples[i] > 0 and not _beyond(rolled, speed, AGREEING):
-            count += 1
-    return count > 2
+    return _count_wheels(params, state, speed)[0] > 2
+
+
+@kernel
+def two_slip(params: Record, state: Record, speed: float) -> bool:
+    """Return whether at least two wheels do not roll at a speed [m/s]."""
+    return _count_wheels(params, state, speed)[1] > 1
 
 
 @kernel

@@ -10,6 +10,10 @@ Where the torques of the drive and of each brake are known and wheels are measur
 friction as learned window by window, s next to 1 and the unreported drag next to none. Elsewhere windows
 teach nothing: mu_i is the configured friction, or what was learned where they did; the unreported drag
 includes the accelerometer's zero. An application that was not measured widens nothing.
+
+What linings ask for reaches the road while wheels roll with the car, whatever the ceiling. So where wheels
+are measured one by one, nothing is bent until two of them have slipped in this application: a control of slip
+that reports nothing takes their pressure from then on, and lets them roll now and then.
 """
 
 import math
@@ -19,6 +23,7 @@ import numpy as np
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.algorithm.estimation.joint.drive import other_decel, torque_share
 from ecu.algorithm.estimation.joint.layout import BIAS, LEVEL, MASS, V
+from ecu.algorithm.estimation.joint.sliding import two_slip, wheels_agree
 from ecu.algorithm.estimation.joint.wheel import (
     brake_torque,
     drive_opposes,
@@ -67,11 +72,13 @@ LONGEST_STEP_S = 0.5  # between samples that are compared
 COASTS_FROM_S, COASTS_TO_S = 0.35, 1.35
 BENDS = 0.7  # of the ceiling, beyond which windows no longer teach friction
 USUAL = 6.0  # m/s^2, of the linings, before any application
+UNSEEN, ROLLED, SLIPPED = range(3)  # what wheels have done in an application
 
 WHOLE_STATE = np.dtype(
     [
         ("filter", FILTER_STATE),
         ("alone", "u1"),  # nothing but whole applications teaches
+        ("wheels", "u1"),  # what they have done in this application
         ("bent", "u1"),  # the linings ask for more than road and tyres give freely
         ("coasting_s", "f8"),  # since a pedal was last pressed
         ("unshown", "f8", (4,)),  # variance of ln friction of a lining against that of all together
@@ -135,10 +142,16 @@ def _hand_over_scale(state: Record, joint: Record) -> None:
 
 
 @kernel
+def _wheels_apart(params: Record, joint: Record) -> bool:
+    """Return whether wheels are measured one by one."""
+    apart: bool = wheels_mapped(params) and joint.speed_copies <= COPIES and joint.sliding < 4
+    return apart
+
+
+@kernel
 def _windows_teach(params: Record, state: Record, joint: Record) -> bool:
-    apart = wheels_mapped(params) and joint.speed_copies <= COPIES and joint.sliding < 4
     measured = torques_measured(params, joint) and torque_share(state) == 1.0
-    teach: bool = apart and measured and params.mapped[ACCEL_X] != 0
+    teach: bool = _wheels_apart(params, joint) and measured and params.mapped[ACCEL_X] != 0
     return teach
 
 
@@ -149,7 +162,8 @@ def begin_whole(params: Record, state: Record, joint: Record) -> None:
     if state.alone and not alone:
         _hand_over_scale(state, joint)
     state.alone = 1 if alone else 0
-    state.bent, state.age_s, state.coasting_s, state.common = 0, 0.0, 0.0, joint.sampling.common
+    state.wheels, state.bent = UNSEEN, 0
+    state.age_s, state.coasting_s, state.common = 0.0, 0.0, joint.sampling.common
     _open_mean(state)
 
 
@@ -184,6 +198,16 @@ def _can_be_judged(params: Record, joint: Record) -> bool:
 
 
 @kernel
+def _all_reaches_the_road(params: Record, state: Record, joint: Record) -> bool:
+    """Return whether wheels that are measured one by one have rolled with the car all this application."""
+    if two_slip(params, joint, joint.x[V]):
+        state.wheels = SLIPPED
+    elif state.wheels == UNSEEN and wheels_agree(params, joint, joint.x[V]):
+        state.wheels = ROLLED
+    return state.wheels == ROLLED and _wheels_apart(params, joint)
+
+
+@kernel
 def add_to_whole(params: Record, state: Record, joint: Record) -> None:
     """Add the last window of an application."""
     w = joint.window
@@ -198,6 +222,8 @@ def add_to_whole(params: Record, state: Record, joint: Record) -> None:
     linings = math.exp(state.filter.value[SCALE]) * _lining_decel(params, joint, mass)
     ceiling = ceiling_of(state.filter)
     expected, by_scale, by_grip, by_fall = bend(linings, ceiling, state.filter.value[FALL])
+    if _all_reaches_the_road(params, state, joint):
+        expected, by_scale, by_grip, by_fall = linings, linings, 0.0, 0.0
     state.bent = 1 if linings > BENDS * ceiling else 0
     state.time += step
     state.measured -= step * other_decel(params, joint, mass, share)

@@ -180,6 +180,38 @@ def test_a_road_that_cuts_off_hard_is_learned_as_a_ceiling(bystander: Bystander)
 
 
 @pytest.mark.parametrize(
+    ("case", "slips", "apart", "bent"),
+    [  # of each wheel, in one window
+        ("all roll", (0.0, 0.01, 0.02, 0.0), True, False),
+        ("one locks: the other three say where the car is", (1.0, 0.0, 0.0, 0.0), True, False),
+        ("both in front are beyond their grip", (0.08, 0.08, 0.0, 0.0), True, True),
+        ("all are where a control of slip keeps them", (0.07, 0.07, 0.06, 0.06), True, True),
+        ("one speed stands for all", (0.0, 0.0, 0.0, 0.0), False, True),
+    ],
+)
+def test_while_wheels_roll_all_that_linings_ask_for_reaches_the_road(
+    bystander: Bystander, case: str, slips: tuple[float, ...], apart: bool, bent: bool
+) -> None:
+    """Linings of 9 m/s^2: once wheels have slipped, the ceiling may explain what is missing."""
+    p, state, joint = bystander.params, bystander.state, bystander.joint
+    joint["speed_copies"] = -1 if apart else COPIES + 1
+    window = joint["window"]
+    window["omega_samples"] = 1
+    per_bar = bystander.linings(1.0)
+    begin_whole(p, state, joint)
+    for number in range(40):
+        slip = np.array(slips) if number == 20 else np.zeros(4)
+        window["omega"] = SPEED * (1.0 - slip) / p["wheel_radius"]
+        bystander.window(9.0 / per_bar, 9.0 + bystander.rest(9.0))
+        add_to_whole(p, state, joint)
+        if number == 20:
+            before = float(state["by_grip"])
+    assert (state["by_grip"] > before) == bent
+    end_whole(state)
+    assert (state["filter"]["value"][GRIP] != 0.0) == bent
+
+
+@pytest.mark.parametrize(
     ("case", "windows", "others"),
     [
         ("shorter than judged", round(LEAST_S / WINDOW_S) - 2, {}),
