@@ -90,9 +90,9 @@ def test_identify_gives_figures_and_files(tmp_path: Path, capsys: pytest.Capture
     ("call", "says"),
     [
         (lambda: identify("tyre", [], out="x.toml"), "identify tyre: No such command 'tyre'"),
-        (lambda: identify("wear", "x.csv", out="x.toml"), "identify wear: Missing option '--config'"),
+        (lambda: identify("wear", __file__, out="x.toml"), "identify wear: Missing option '--config'"),
         (lambda: identify("dust", "x.csv", out="x.toml", foo=1), "identify dust: No such option: --foo"),
-        (lambda: suggest_map("no.log"), "no.log: cannot be read"),
+        (lambda: suggest_map("no.log"), "no.log: no such file"),
         (lambda: compare("a.parquet", "b.parquet"), "a.parquet: no such file"),
     ],
 )
