@@ -1,4 +1,4 @@
-"""Bands of the plots over time: thin lines that hide nothing and do not set the axis."""
+"""Bands and shades of the plots over time hide nothing and do not set the axis; shades cost no model each."""
 
 from pathlib import Path
 
@@ -9,6 +9,8 @@ from bokeh.models import HoverTool
 from brakelab.report.drive import DriveResult
 from brakelab.report.over_time import plots_over_time
 from ecu.contract.signals import CORNERS
+
+from .conftest import braking_between
 
 
 @pytest.mark.parametrize(("column", "plot"), [("mu_b", "friction-front"), ("disc_temperature", "disc-rear")])
@@ -30,3 +32,22 @@ def test_a_wide_band_hides_nothing_and_compresses_nothing(column: str, plot: str
         "right +2σ",
         "right −2σ",
     ]
+
+
+def test_many_brake_applications_make_no_more_models() -> None:
+    t = np.arange(0.0, 300.0, 0.01)
+    columns = {"vehicle_speed": 20.0 + 0.01 * t, "mode": np.ones(len(t)), "braking": np.ones(len(t))}
+    drive = DriveResult(t, columns, {})
+    few, many = (
+        plots_over_time(drive, None, [braking_between(2.0 * i, 2.0 * i + 1.0) for i in range(count)])
+        for count in (1, 100)
+    )
+    assert [len(plot.references()) for plot in few.values()] == [
+        len(plot.references()) for plot in many.values()
+    ]
+    shades = {id(one): one for plot in many.values() for one in plot.renderers if one.level == "image"}
+    assert len(shades) == 1  # shared, behind the grid
+    for plot in many.values():
+        hit = [one for tool in plot.select(type=HoverTool) for one in tool.renderers]
+        assert hit
+        assert not shades.keys() & map(id, hit)

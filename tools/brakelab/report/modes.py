@@ -100,5 +100,5 @@ def modes_plot(drive: DriveResult, grid: Buckets, span: Range1d) -> Any:
         legend.glyph_width = 14
         legend.glyph_height = 14
     tips = [("@row", "@state"), ("from", "@start{0.00} s"), ("to", "@end{0.00} s")]
-    plot.add_tools(HoverTool(tooltips=tips))
+    plot.add_tools(HoverTool(renderers=list(plot.renderers), tooltips=tips))
     return plot

@@ -5,8 +5,8 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-from bokeh.models import ColumnDataSource, HoverTool, Range1d
-from bokeh.models.annotations import BoxAnnotation
+from bokeh.models import ColumnDataSource, HoverTool, Range1d, VStrip
+from bokeh.models.renderers import GlyphRenderer
 
 from brakelab.arrays import Vector
 from brakelab.report.brakings import Braking, inside_any
@@ -69,12 +69,19 @@ def plots_over_time(drive: DriveResult, truth: DriveResult | None, found: list[B
         "modes": modes_plot(drive, _coarse(grid), span),
     }
     plots = {name: plot for name, plot in plots.items() if plot.renderers}
-    look: dict[str, Any] = {"fill_color": SHADE, "fill_alpha": 1.0, "line_color": None, "level": "image"}
-    shades = [BoxAnnotation(left=braking.t_start, right=braking.t_end, **look) for braking in found]
-    for plot in plots.values():
-        plot.center.extend(shades)  # the same in all plots: a long drive has hundreds
+    if found:
+        shades = _shades(found)
+        for plot in plots.values():
+            plot.renderers.append(shades)
     link_crosshair(list(plots.values()))
     return plots
+
+
+def _shades(found: list[Braking]) -> Any:
+    """Return the brake applications as one glyph behind grid and lines: boxes take seconds to draw."""
+    times = {name: np.array([getattr(braking, name) for braking in found]) for name in ("t_start", "t_end")}
+    strips = VStrip(x0="t_start", x1="t_end", fill_color=SHADE, line_color=None)
+    return GlyphRenderer(data_source=ColumnDataSource(times), glyph=strips, level="image")
 
 
 def _coarse(grid: Buckets) -> Buckets:
