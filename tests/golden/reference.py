@@ -6,6 +6,7 @@ Parts are texts, and arrays of numbers or of texts: the values of a text are its
 """
 
 import csv
+import fcntl
 import hashlib
 import json
 import os
@@ -65,11 +66,13 @@ def _committed(run: str) -> dict[str, list[str]]:
 
 
 def _write(run: str, found: Mapping[str, list[str]]) -> None:
-    """Replace the lines of one run."""
-    with REFERENCE.open(newline="") as file:
-        others = [row for row in csv.reader(file) if row[0] != run]
-    rows = others + [[run, part, *cells] for part, cells in found.items()]
-    with REFERENCE.open("w", newline="") as file:
+    """Replace the lines of one run, beside other workers that replace theirs."""
+    with REFERENCE.open("r+", newline="") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        rows = [row for row in csv.reader(file) if row[0] != run]
+        rows += [[run, part, *cells] for part, cells in found.items()]
+        file.seek(0)
+        file.truncate()
         csv.writer(file, lineterminator="\n").writerows(sorted(rows, key=lambda row: row[0]))
     MADE_ON.write_text(json.dumps(machine(), indent=1) + "\n")
 
