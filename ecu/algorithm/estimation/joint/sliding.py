@@ -52,7 +52,7 @@ def wheel_slides(params: Record, state: Record, i: int) -> bool:
 
 
 @kernel
-def _count_wheels(params: Record, state: Record, speed: float) -> tuple[int, int]:
+def count_wheels(params: Record, state: Record, speed: float) -> tuple[int, int]:
     """Return how many of the wheels that were read roll at a speed [m/s], and how many do not."""
     rolling = slipping = 0
     for i in range(4):
@@ -66,13 +66,7 @@ def _count_wheels(params: Record, state: Record, speed: float) -> tuple[int, int
 @kernel
 def wheels_agree(params: Record, state: Record, speed: float) -> bool:
     """Return whether at least three wheels roll at a speed [m/s]."""
-    return _count_wheels(params, state, speed)[0] > 2
-
-
-@kernel
-def two_slip(params: Record, state: Record, speed: float) -> bool:
-    """Return whether at least two wheels do not roll at a speed [m/s]."""
-    return _count_wheels(params, state, speed)[1] > 1
+    return count_wheels(params, state, speed)[0] > 2
 
 
 @kernel

@@ -23,7 +23,7 @@ import numpy as np
 from ecu.algorithm.estimate import GREATEST_RATIO, LEAST_RATIO
 from ecu.algorithm.estimation.joint.drive import other_decel, torque_share
 from ecu.algorithm.estimation.joint.layout import BIAS, LEVEL, MASS, V
-from ecu.algorithm.estimation.joint.sliding import two_slip, wheels_agree
+from ecu.algorithm.estimation.joint.sliding import count_wheels
 from ecu.algorithm.estimation.joint.wheel import (
     brake_torque,
     drive_opposes,
@@ -200,9 +200,10 @@ def _can_be_judged(params: Record, joint: Record) -> bool:
 @kernel
 def _all_reaches_the_road(params: Record, state: Record, joint: Record) -> bool:
     """Return whether wheels that are measured one by one have rolled with the car all this application."""
-    if two_slip(params, joint, joint.x[V]):
+    rolling, slipping = count_wheels(params, joint, joint.x[V])
+    if slipping > 1:
         state.wheels = SLIPPED
-    elif state.wheels == UNSEEN and wheels_agree(params, joint, joint.x[V]):
+    elif state.wheels == UNSEEN and rolling > 2:
         state.wheels = ROLLED
     return state.wheels == ROLLED and _wheels_apart(params, joint)
 
@@ -221,9 +222,10 @@ def add_to_whole(params: Record, state: Record, joint: Record) -> None:
     mass = _mass(params, state, joint)
     linings = math.exp(state.filter.value[SCALE]) * _lining_decel(params, joint, mass)
     ceiling = ceiling_of(state.filter)
-    expected, by_scale, by_grip, by_fall = bend(linings, ceiling, state.filter.value[FALL])
     if _all_reaches_the_road(params, state, joint):
         expected, by_scale, by_grip, by_fall = linings, linings, 0.0, 0.0
+    else:
+        expected, by_scale, by_grip, by_fall = bend(linings, ceiling, state.filter.value[FALL])
     state.bent = 1 if linings > BENDS * ceiling else 0
     state.time += step
     state.measured -= step * other_decel(params, joint, mass, share)
