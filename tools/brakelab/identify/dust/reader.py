@@ -120,11 +120,9 @@ def read_trip(path: Path, name: str, test: bool, described: Columns) -> Recorded
     counted = ~in_gap(t[np.isfinite(columns[count])], grid)
     _check_ranges(path, even)
     speed, pressure, torque, temperature, concentration, flow = even.values()
-    pressure = pressure - described.rig.push_out_pressure
-    braked = Recording(
-        grid, 1e5 * (pressure + described.rig.push_out_pressure), positive(torque), speed, temperature
-    )
+    braked = Recording(grid, 1e5 * pressure, positive(torque), speed, temperature)
     torque = without_zero(braked, described, str(path)).torque
+    pressure = pressure - described.rig.push_out_pressure
     trip = Recorded(
         name, test, grid - grid[0], np.maximum(speed, 0.0), pressure, np.abs(torque), temperature,
         concentration, flow, counted,

@@ -21,7 +21,7 @@ import numpy as np
 from brakelab.identify.friction.candidate import Candidate
 from brakelab.identify.friction.candidates import candidates
 from brakelab.identify.friction.columns import Columns
-from brakelab.identify.friction.fit import Fitted, error_of, fit, refit, replayed
+from brakelab.identify.friction.fit import Fitted, error_of, fit, nrmse, refit, replayed
 from brakelab.identify.friction.stops import Stops, some
 from brakelab.plant.friction.law import Law, RigBrake
 from brakelab.results.processes import new_pool
@@ -136,9 +136,9 @@ def judge(job: Job) -> Judged:
     else:
         law, unseen = fitted.law, job.unseen
     overall = held_out = error_of(law, job.brake, unseen, closed=True)
-    square = (replayed(law, job.brake, unseen, starts_at_measured=False, closed=True) - unseen.mu) ** 2
+    off = replayed(law, job.brake, unseen, starts_at_measured=False, closed=True) - unseen.mu
     samples = np.bincount(unseen.block_stop, minlength=len(unseen))
-    misses = np.bincount(unseen.block_stop, square, len(unseen)) / np.maximum(samples, 1)
+    misses = np.bincount(unseen.block_stop, off**2, len(unseen)) / np.maximum(samples, 1)
     if job.unseen is None:
         every = error_of(fitted.law, job.brake, job.stops, closed=True)
         overall = float(np.sqrt((1.0 - HELD_OUT) * every**2 + HELD_OUT * held_out**2))
@@ -147,7 +147,7 @@ def judge(job: Job) -> Judged:
         fitted.law,
         candidate.starts_at_measured,
         candidate.size,
-        100.0 * float(np.sqrt(np.mean(fitted.residuals**2)) / np.mean(job.stops.mu)),
+        nrmse(fitted.residuals, job.stops),
         held_out,
         overall,
         candidate.bounded,

@@ -143,7 +143,11 @@ def replayed(
 
 def error_of(law: Law, brake: RigBrake, stops: Stops, closed: bool = False) -> float:
     """Return the nRMSE [%]: RMS of all blocks over their mean friction; see `replayed`."""
-    off = replayed(law, brake, stops, starts_at_measured=False, closed=closed) - stops.mu
+    return nrmse(replayed(law, brake, stops, starts_at_measured=False, closed=closed) - stops.mu, stops)
+
+
+def nrmse(off: Vector, stops: Stops) -> float:
+    """Return the RMS of what all blocks are `off`, shape (blocks,), over their mean friction [%]."""
     return 100.0 * float(np.sqrt(np.mean(off**2)) / np.mean(stops.mu))
 
 

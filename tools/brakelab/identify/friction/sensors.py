@@ -144,10 +144,10 @@ def coolings(whole: Recording, described: Columns) -> Array:
         time, heat = whole.time[begin:end], whole.temperature[begin:end]
         if not begin or len(time) < FEWEST_SAMPLES or np.diff(time).max() > 1.0:
             continue
-        since = time - time[0]
-        for first in np.arange(EVENED_S, since[-1] - 0.5 * LONGEST_S, LONGEST_S):
-            part = (since >= first) & (since < first + LONGEST_S)
-            slope, _ = np.polyfit(since[part], heat[part], 1)
+        let_go_s = time - time[0]
+        for first in np.arange(EVENED_S, let_go_s[-1] - 0.5 * LONGEST_S, LONGEST_S):
+            part = (let_go_s >= first) & (let_go_s < first + LONGEST_S)
+            slope, _ = np.polyfit(let_go_s[part], heat[part], 1)
             if (mean := float(heat[part].mean())) > RADIATES:
                 continue
             speed = radius * float(np.abs(whole.speed[begin:end][part]).mean())
