@@ -105,8 +105,9 @@ def _exchange(ecu: Ecu, channel: Channel, grid: Grid, run: Progress) -> None:
     if run.speaks:
         due = transmit(ecu.transmit_plan, ecu.transmission, ecu.vector, run.number, ecu.sending)
     encoded = clock()
-    if encoded - tick.t_mono_ns < GIVEN_UP_NS:  # else the process stood still since it woke
-        channel.send(ecu.sending, due)
+    for i in range(due):
+        if clock() - tick.t_mono_ns < GIVEN_UP_NS:  # else the process stood still since it woke
+            channel.send(ecu.sending[i : i + 1], 1)
     instants = (woken, drained, received, stepped, encoded, clock())
     cycle["stage_ns"] = tuple(after - before for before, after in pairwise(instants))
 

@@ -39,7 +39,7 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self.now_ns, self.offset_ns = 0, EPOCH_NS
         self.next_ns = CYCLE_NS - MS
-        self.oversleeps_ns = self.stopped_ns = 0
+        self.oversleeps_ns = self.stopped_ns = self.stops_behind_a_frame_ns = 0
         self.name, self.line, self.sent, self.pending = "bench", FINE, [], []
         self.plan = contract_transmit_plan(DBC, "Vehicle")
         self.counters, self.buffer = new_transmission(self.plan), frame_buffer(self.plan)
@@ -94,7 +94,8 @@ class Bench:
         return count
 
     def send(self, frames, count):
-        self.sent = [int(can_id) for can_id in frames["can_id"][:count]]
+        self.sent += [int(can_id) for can_id in frames["can_id"][:count]]
+        self.now_ns += self.stops_behind_a_frame_ns
         return count
 
     def status(self):
@@ -205,6 +206,13 @@ def test_what_was_computed_before_the_process_stood_still_is_not_sent(braking, s
     braking.run()
     assert braking.sent[0] == braking.ecu.transmit_plan.ids[0]
     assert (braking.ecu.outputs["pressure_demand"] == 0).all()
+
+
+@pytest.mark.requirement("REQ-DEM-5")
+def test_of_a_process_that_stands_still_while_it_sends_only_what_left_before_is_heard(braking):
+    braking.stops_behind_a_frame_ns = 503 * MS
+    braking.run()
+    assert braking.sent == [braking.ecu.transmit_plan.ids[0]]
 
 
 def test_a_cycle_that_only_lasts_long_is_sent(braking):

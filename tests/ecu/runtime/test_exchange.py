@@ -92,11 +92,12 @@ class Echo(Daemon):
         self.now_ns = self.woken_ns
 
     def drain(self, frames, start):
+        self.sent = []
         frames[start : start + len(self.frames)] = self.frames
         return len(self.frames)
 
     def send(self, frames, count):
-        self.sent = wire_format(frames[:count])
+        self.sent += wire_format(frames[:count])
         return count
 
     def status(self):
