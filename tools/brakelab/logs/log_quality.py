@@ -257,12 +257,13 @@ def checked(
         outliers = np.flatnonzero(verdict == OUTLIER)
         if len(outliers):
             quality.note_damage(len(outliers), _place(block, outliers[0]))
-        frames = frames[verdict == KEPT]
+        if (verdict != KEPT).any():
+            frames = frames[verdict == KEPT]
         quality.stamps_backwards = int(stamps["backwards"])
         quality.stamps_repeated = int(stamps["repeated"])
         quality.frames_twice = int(stamps["twice"])
         first = np.concatenate([first, frames[: FEW - len(first)]])
-        before = np.concatenate([before, frames])[-MEMORY:]
+        before = np.concatenate([before, frames[-MEMORY:]])[-MEMORY:]
         quality.clock_set, quality.gaps = int(stamps["set"]), int(stamps["gaps"])
         quality.frames += len(frames)
         if _falls(frames, quality) and not quality.backwards:
