@@ -291,13 +291,15 @@ def _answered(arguments: list[str]) -> int:
     Raises:
         BrokenPipeError: nobody reads what it prints.
     """
+    had_reader = not streams.is_nowhere()
     with new_policy() as asked:
         try:
             code = _run(arguments)
         except (KeyboardInterrupt, typer.Abort):
             return INTERRUPTED
         except Exception as error:
-            if isinstance(error, BrokenPipeError) and (streams.are_unread() or streams.is_nowhere()):
+            gone = had_reader and streams.is_nowhere()
+            if isinstance(error, BrokenPipeError) and (gone or streams.are_unread()):
                 raise
             if COMPLETE in os.environ:
                 return 1  # nothing to complete after a mistake

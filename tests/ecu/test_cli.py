@@ -1,6 +1,5 @@
 """What a user reads who typed something wrong: one line, and the exit code."""
 
-import errno
 import re
 import subprocess
 import sys
@@ -217,15 +216,20 @@ def test_output_that_nobody_reads_is_no_mistake(words: str) -> None:
     assert (ended.stdout, ended.stderr) == ("141\n", "")
 
 
-def test_another_broken_pipe_is_a_fault(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    def run(*_: object) -> None:
-        raise BrokenPipeError(errno.EPIPE, "Broken pipe")
-
-    monkeypatch.setattr("ecu.doctor.doctor", run)
-    assert cli.main(["doctor"]) == 1
-    monkeypatch.undo()
+@pytest.mark.parametrize("output", [subprocess.PIPE, subprocess.DEVNULL], ids=["a pipe", "nowhere"])
+def test_another_broken_pipe_is_a_fault(output: int) -> None:
+    code = (
+        "import errno\n"
+        "from ecu import cli, doctor\n"
+        "def run(*_):\n"
+        "    raise BrokenPipeError(errno.EPIPE, 'Broken pipe')\n"
+        "doctor.doctor = run\n"
+        "raise SystemExit(cli.main(['doctor']))\n"
+    )
+    command = [sys.executable, "-P", "-c", code]
+    ended = subprocess.run(command, stdout=output, stderr=subprocess.PIPE, text=True)
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("brake-ecu: unexpected BrokenPipeError: [Errno 32] Broken pipe (")
 
 
 def test_an_interruption_while_it_loads_is_quiet() -> None:
