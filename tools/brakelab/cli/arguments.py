@@ -1,5 +1,7 @@
 """Arguments and options that several of the laboratory's commands share."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +15,15 @@ def present(given: list[Path] | Path | None) -> list[Path] | Path | None:
     for path in given if isinstance(given, list) else [given] if given else []:
         regular(path, "an existing file")
     return given
+
+
+@contextmanager
+def loading(words: str) -> Iterator[None]:
+    """Show a bar while a command imports what it needs: SciPy alone takes a second."""
+    from brakelab.results.progress import progress_bar
+
+    with progress_bar(words, None):
+        yield
 
 
 Plant = Annotated[

@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any
 
-from brakelab.cli.arguments import Columns, present
+from brakelab.cli.arguments import Columns, loading, present
 from ecu.arguments import Commands, argument, option
 from ecu.completion import fitting, shipped
 from ecu.settings.resources import resource
@@ -51,10 +51,9 @@ def run(
     ] = None,
 ) -> None:
     """Run a programme on the dynamometer. Record at 200 Hz; the pad follows none of the friction laws."""
-    from brakelab.results.progress import progress_bar
     from ecu.compiling import report_compiling
 
-    with progress_bar("lab run", None):
+    with loading("lab run"):
         from brakelab.identify.friction import command
 
     with report_compiling():
@@ -69,9 +68,7 @@ def look(
     columns: Columns = None,
 ) -> None:
     """Analyse a recording. Show principal components, shares of variance, effect of the previous stop."""
-    from brakelab.results.progress import progress_bar
-
-    with progress_bar("lab look", None):  # SciPy alone takes a second
+    with loading("lab look"):
         from brakelab.identify.friction import command
 
     command.look(data, columns)
@@ -95,9 +92,7 @@ def report(
     ] = None,
 ) -> int:
     """Show friction section by section, as for AK-Master (SAE J2522). Compare two linings."""
-    from brakelab.results.progress import progress_bar
-
-    with progress_bar("lab report", None):
+    with loading("lab report"):
         from brakelab.identify.friction.report import report as report_of
 
     return report_of(data, other, columns, programme, out)

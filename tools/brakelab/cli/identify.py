@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakelab.cli.arguments import Columns, present
+from brakelab.cli.arguments import Columns, loading, present
 from ecu.arguments import Commands, Config, Map, argument, flag, option
 
 app = Commands(help="Identify models from your own measurements.", no_args_is_help=True)
@@ -36,10 +36,9 @@ def friction(
     ] = None,
 ) -> None:
     """Identify a friction law from dynamometer recordings. Fit all laws, choose one, state its limits."""
-    from brakelab.results.progress import progress_bar
     from ecu.compiling import report_compiling
 
-    with progress_bar("identify friction", None):  # SciPy alone takes a second
+    with loading("identify friction"):
         from brakelab.identify.friction import command
 
     with report_compiling():
@@ -103,9 +102,7 @@ def thermal(
     map: Map = None,
 ) -> None:
     """Identify the disc temperature model, dry and wet. Write a CONFIG."""
-    from brakelab.results.progress import progress_bar
-
-    with progress_bar("identify thermal", None):
+    with loading("identify thermal"):
         from brakelab.identify.thermal import command
 
     command.identify_thermal(logs, config, map, out)
@@ -124,9 +121,7 @@ def vehicle(
     ] = False,
 ) -> None:
     """Identify radii, mass, drag, tyres and brakes of a car. Write a CONFIG."""
-    from brakelab.results.progress import progress_bar
-
-    with progress_bar("identify vehicle", None):
+    with loading("identify vehicle"):
         from brakelab.identify.vehicle import command
 
     command.identify_vehicle(drives, config, map, closed, out)
