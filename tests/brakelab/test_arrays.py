@@ -1,13 +1,14 @@
-"""Columns of Arrow made of numpy's memory."""
+"""Columns of Arrow made of numpy's memory, and read as that."""
 
 import subprocess
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pyarrow as pa
 import pytest
 
-from brakelab.arrays import arrow_array, median
+from brakelab.arrays import arrow_array, median, numpy_array
 
 NAN, INF = np.nan, np.inf
 COLUMNS = [
@@ -33,10 +34,28 @@ def test_what_is_not_a_number_is_null(kind, numbers, column) -> None:
     assert array.to_pylist() == column
 
 
+@pytest.mark.parametrize("chunks", [1, 2, 5])
+@pytest.mark.parametrize(("kind", "numbers", "column"), COLUMNS, ids=[str(row[0]) for row in COLUMNS])
+def test_a_column_is_read_as_pyarrow_reads_it(kind, numbers, column, chunks) -> None:
+    """A slice of it too, whose memory begins before it."""
+    whole = pa.array([None, *column], kind).slice(1)
+    ends = np.linspace(0, len(whole), chunks + 1).astype(int)
+    parts = pa.chunked_array([whole.slice(a, b - a) for a, b in pairwise(ends)], kind)
+    known = parts if kind == pa.string() else parts.cast(pa.float64())
+    np.testing.assert_array_equal(numpy_array(parts), known.to_numpy(zero_copy_only=False))
+    assert numpy_array(parts).dtype == (object if kind == pa.string() else float)
+
+
+def test_what_is_no_number_is_refused() -> None:
+    with pytest.raises(pa.ArrowException):
+        numpy_array(pa.chunked_array([[{"a": 1}]]))
+
+
 def test_pandas_is_not_imported() -> None:
     script = (
-        "import sys, numpy as np, pyarrow as pa\nfrom brakelab.arrays import arrow_array, median\n"
-        "arrow_array(np.arange(3.0), pa.int8()), arrow_array(['fl'], pa.string())\n"
+        "import sys, numpy as np, pyarrow as pa\nfrom brakelab.arrays import arrow_array, numpy_array\n"
+        "for one in (arrow_array(np.array([3.0, np.nan]), pa.int8()), arrow_array(['fl'], pa.string())):\n"
+        "    numpy_array(pa.chunked_array([one]))\n"
         "print('pandas' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", script], capture_output=True).stdout == b"False\n"

@@ -1,4 +1,4 @@
-"""Arrays of numbers, by what they hold, and as columns of Arrow."""
+"""Arrays of numbers, by what they hold, as columns of Arrow and out of them."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -49,3 +49,23 @@ def arrow_array(values: Any, kind: Any) -> "pa.Array[Any]":
     data = numbers.astype(kind.to_pandas_dtype(), copy=False)
     nulls = None if known.all() else pa.py_buffer(np.packbits(known, bitorder="little").data)
     return pa.Array.from_buffers(kind, len(numbers), [nulls, pa.py_buffer(data)])
+
+
+def numpy_array(column: "pa.ChunkedArray[Any]") -> NDArray[Any]:
+    """Return a column of Arrow: numbers as float64, NaN where one is null, or texts, None where one is null.
+
+    Of its memory: `to_numpy` imports pandas. Raises `pa.ArrowException` where a value is no number.
+    """
+    import pyarrow as pa
+
+    if pa.types.is_string(column.type):
+        return np.array([*column.to_pylist(), None], object)[:-1]
+    numbers = column.cast(pa.float64()).combine_chunks()
+    if len(numbers) == 0:
+        return np.zeros(0)
+    buffers: list[Any] = numbers.buffers()
+    values = np.frombuffer(buffers[1], np.float64, len(numbers), 8 * numbers.offset)
+    if not numbers.null_count:
+        return values
+    known = np.unpackbits(np.frombuffer(buffers[0], np.uint8), bitorder="little")
+    return np.where(known[numbers.offset :][: len(numbers)], values, np.nan)

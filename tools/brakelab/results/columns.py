@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from brakelab.arrays import Vector
+from brakelab.arrays import Vector, numpy_array
 from brakelab.results import mcap_file, mdf
 from ecu.errors import UserError
 
@@ -86,9 +86,7 @@ def open_columns(path: Path, remedy: str, required: Iterable[str] = ()) -> Store
 
     def read(name: str) -> Values:
         with _readable(path, remedy):
-            column = file.read([name]).column(0)
-            kind = column.type if pa.types.is_string(column.type) else pa.float64()
-            return np.asarray(column.cast(kind).to_numpy(zero_copy_only=False))
+            return numpy_array(file.read([name]).column(0))
 
     schema = file.schema_arrow
     for name in required:
