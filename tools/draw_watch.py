@@ -78,7 +78,8 @@ class Browser:
             json.dumps({"id": self._number, "method": method, "params": parameters})
         )
         while True:
-            message = json.loads(await asyncio.wait_for(self._socket.read_message(), PATIENCE_S) or "{}")
+            read: Any = self._socket.read_message()
+            message = json.loads(await asyncio.wait_for(read, PATIENCE_S) or "{}")
             if message.get("id") == self._number:
                 return dict(message["result"])
 

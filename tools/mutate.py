@@ -22,7 +22,6 @@ import sys
 import time
 import tomllib
 from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -104,7 +103,8 @@ def mutants(source: str) -> Iterator[tuple[str, list[ast.stmt]]]:
 
 def _following(changed: ast.stmt, rest: list[ast.stmt]) -> list[ast.stmt]:
     """Return the constants computed from those a statement defines, in their order."""
-    names, follow = _defined(changed), []
+    follow: list[ast.stmt] = []
+    names = _defined(changed)
     for statement in rest:
         used = {node.id for node in ast.walk(statement) if isinstance(node, ast.Name)}
         if isinstance(statement, ast.Assign | ast.AnnAssign) and used & names:
@@ -249,14 +249,15 @@ class Mutation:
 
     def _run_tests(self, session: pytest.Session, measure: bool) -> None:
         """Run those first that kill most a second; measured: all of them, else all that are not skipped."""
-        order = range(len(session.items))
+        order = list(range(len(session.items)))
         if not measure:
             rate = (1.0 + self._kills) / self._seconds
             order = [k for k in np.argsort(-rate) if math.isfinite(rate[k])]
-        for k, following in pairwise([*order, None]):
+        for k, following in zip(order, [*order[1:], None], strict=False):
             self._test = k
             began_s = time.process_time()
-            signal.setitimer(signal.ITIMER_PROF, 0.0 if measure else PATIENCE_S + SLOWER * self._seconds[k])
+            patience_s = 0.0 if measure else float(PATIENCE_S + SLOWER * self._seconds[k])
+            signal.setitimer(signal.ITIMER_PROF, patience_s)
             nextitem = None if following is None else session.items[following]
             session.config.hook.pytest_runtest_protocol(item=session.items[k], nextitem=nextitem)
             if measure:

@@ -9,7 +9,7 @@ installed.
 import re
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 ROOT: Final = Path(__file__).parent.parent
 PAGE: Final = ROOT / "docs/third-party.md"
@@ -49,7 +49,7 @@ def licence(package: str) -> str:
     if package in UNSTATED:
         return UNSTATED[package]
     try:
-        about = metadata(package)
+        about: Any = metadata(package)
     except PackageNotFoundError:
         return "not installed where this page was written"
     classified = [
