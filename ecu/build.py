@@ -178,6 +178,7 @@ def _load_workload() -> Callable[[], None]:
 
 
 def main() -> NoReturn:
+    """Compile the kernels, as the command line asks."""
     parser = argparse.ArgumentParser(
         prog="python -m ecu.build", description="Compile the kernels of the ECU."
     )

@@ -38,6 +38,7 @@ def _tell_progress(count: int) -> None:
 
 
 def main() -> int:
+    """Compile what is missing, and return the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m ecu.warm", description="Compile the kernels of the cycle."
     )

@@ -105,6 +105,7 @@ def _parts(results: Iterable[Any]) -> list[Any]:
 
 
 def returned_spec(kind: Any) -> Spec | None:
+    """Return how a manifest writes what a kernel returns, None for what no library can give."""
     if isinstance(kind, types.NoneType):
         return ("none",)
     if isinstance(kind, types.Boolean):

@@ -27,6 +27,7 @@ def _load_tests() -> Callable[[], None]:
 
 
 def main() -> NoReturn:
+    """Compile the kernels, as the command line asks."""
     parser = argparse.ArgumentParser(
         prog="python -m brakelab.build", description="Compile the kernels of laboratory and ECU."
     )

@@ -86,6 +86,7 @@ def compile_all() -> None:
 
 
 def main() -> int:
+    """Compile what is missing, and return the exit code."""
     compiled = CompileCounter()
     daemon = subprocess.Popen([sys.executable, "-m", "ecu.warm"])
     compile_vehicle()

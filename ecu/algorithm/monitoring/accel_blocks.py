@@ -31,6 +31,7 @@ def gather_block(
     base: Record,
     braking: bool,
 ) -> None:
+    """Add a cycle to the sums of the block: accelerometer, wheels, force of the brakes and motors."""
     value = inputs.value
     force, wheels = 0.0, 0.0
     for i in range(4):
@@ -49,6 +50,7 @@ def gather_block(
 
 @kernel
 def close_block(params: Record, state: Record) -> None:
+    """Put the block's means before those of earlier ones, and begin the next block."""
     turns = 0.5 * params.wheel_radius[0] * params.sigma_wheel_speed
     variance = 0.6 * params.sigma_accel**2 + 2.0 * (turns / (2.0 * BLOCK_S)) ** 2
     state.sigma = math.sqrt(variance / max(state.readings, 1))
@@ -67,11 +69,13 @@ def close_block(params: Record, state: Record) -> None:
 
 @kernel
 def now(mean: Record, j: int) -> float:
+    """Return the mean of a quantity over the last three blocks."""
     return (mean[0, j] + mean[1, j] + mean[2, j]) / 3.0
 
 
 @kernel
 def before(mean: Record, j: int) -> float:
+    """Return the mean of a quantity over four blocks, which ended a block before the last three began."""
     return 0.25 * (mean[4, j] + mean[5, j] + mean[6, j] + mean[7, j])
 
 

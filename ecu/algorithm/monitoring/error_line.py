@@ -60,12 +60,14 @@ def sigma_line(line: Record, h: float) -> float:
 
 @kernel
 def learn_offset(line: Record, memory_s: float) -> None:
+    """Let the usual offset follow that of now, over `memory_s` at most."""
     line.offset_s = min(line.offset_s + BLOCK_S, memory_s)
     line.usual.offset += (line.now.offset - line.usual.offset) * BLOCK_S / line.offset_s
 
 
 @kernel
 def learn_scale(line: Record, memory_s: float) -> None:
+    """Let the usual scale follow that of now, over `memory_s` at most."""
     line.scale_s = min(line.scale_s + BLOCK_S, memory_s)
     line.usual.scale += (line.now.scale - line.usual.scale) * BLOCK_S / line.scale_s
 
@@ -79,6 +81,7 @@ def moved_offset(line: Record) -> float:
 
 @kernel
 def moved_scale(line: Record) -> float:
+    """Return what the scale of a line has moved by [-]."""
     moved: float = line.now.scale - line.usual.scale
     return moved
 

@@ -117,6 +117,7 @@ def replay(
 
 @kernel
 def block_means(values: Record, first: Record, per_block: int, out: Record) -> None:
+    """Write the means of blocks of `per_block` values, each from its place in `first` on."""
     for block in range(len(first)):
         total = 0.0
         for k in range(first[block], first[block] + per_block):

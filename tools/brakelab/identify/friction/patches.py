@@ -101,6 +101,7 @@ def apply(pad: Record, state: Record, temperature: float, random: Generator) -> 
 
 @kernel
 def logistic(x: float) -> float:
+    """Return 1 / (1 + exp(-x)), x within 40."""
     return 1.0 / (1.0 + math.exp(-min(max(x, -40.0), 40.0)))
 
 

@@ -87,6 +87,7 @@ def _solve(regressors: Array, mass: Array, sigma: Array, terms: tuple[int, ...])
 
 
 def sigma_of(mass: Array, variance: Array, scatter: float) -> Array:
+    """Return the standard deviation of masses: of the balance, and a scatter in proportion to the mass."""
     return np.asarray(np.sqrt(variance + (scatter * mass) ** 2))
 
 

@@ -49,6 +49,7 @@ class Network(Law):
 
 @kernel
 def sigmoid(x: float) -> float:
+    """Return 1 / (1 + exp(-x)), x within 50."""
     return 1.0 / (1.0 + math.exp(-min(max(x, -50.0), 50.0)))
 
 
