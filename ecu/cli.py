@@ -48,10 +48,10 @@ from ecu.arguments import (
     flag,
     option,
 )
-from ecu.cli_config import app as config_app
-from ecu.cli_diagnostics import app as diagnostics_app
-from ecu.cli_watch import app as watch_app
-from ecu.cli_xcp import app as xcp_app
+from ecu.commands.config import app as config_app
+from ecu.commands.diagnostics import app as diagnostics_app
+from ecu.commands.watch import app as watch_app
+from ecu.commands.xcp import app as xcp_app
 from ecu.completion import known
 from ecu.errors import Mistakes, RunFault, UserError
 from ecu.output import LOG_FORMATS, Level, fault, give, log_as, new_policy, policy, print_given

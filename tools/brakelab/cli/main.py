@@ -31,7 +31,7 @@ from ecu.arguments import (
     option,
     scenario_file,
 )
-from ecu.cli_config import app as config_app
+from ecu.commands.config import app as config_app
 from ecu.completion import fitting, known, shipped
 from ecu.errors import UserError
 from ecu.output import wrote

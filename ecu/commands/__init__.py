@@ -1,0 +1,1 @@
+"""Groups of commands of `brake-ecu`; each command imports what it needs when it is called."""
