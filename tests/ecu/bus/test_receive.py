@@ -9,7 +9,7 @@ import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
 from ecu.bus.database import load_database
-from ecu.bus.freshness import begin_cycle, end_cycle, new_freshness, target_dtype
+from ecu.bus.freshness import begin_cycle, end_cycle, new_freshness
 from ecu.bus.plan import SignalUse
 from ecu.bus.receive import EXTENDED_ID, new_reception, receive
 from ecu.bus.receive_plan import MessageUse, compile_receive, contract_receive_plan, places_of
@@ -445,11 +445,13 @@ def test_of_a_multiplexed_message_comes_what_its_multiplexer_says(tmp_path: Path
     )
     message = load_database(path).messages[0]
     use = MessageUse(message, [SignalUse("one", 0), SignalUse("two", 1)], 0.01, 0.01)
-    plan = compile_receive([use], new_freshness([0.1] * 2, [0.01] * 2, [0.01] * 2, [0.0] * 2, [255.0] * 2))
+    places = np.ones(N_INPUTS)  # as many as the library's kernel has
+    fresh = new_freshness(0.1 * places, 0.01 * places, 0.01 * places, 0.0 * places, 255.0 * places)
+    plan = compile_receive([use], fresh)
     for which, new in ((1, [1, 0]), (2, [0, 1]), (3, [0, 0])):
-        inputs, frames = np.zeros(1, target_dtype(2)), new_record(FRAME)
+        inputs, frames = new_record(INPUTS), new_record(FRAME)
         frames["can_id"], frames["length"], frames["data"][0, :3] = 1, 3, [which, 10, 20]
         begin_cycle(inputs[0], 0, CYCLE_NS)
         receive(plan, new_reception(plan), frames, 0, 1, inputs[0])
-        assert inputs["new"][0].tolist() == new
-        assert inputs["value"][0].tolist() == [10.0 * new[0], 20.0 * new[1]]
+        assert inputs["new"][0, :2].tolist() == new
+        assert inputs["value"][0, :2].tolist() == [10.0 * new[0], 20.0 * new[1]]
