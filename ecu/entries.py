@@ -6,6 +6,7 @@ A test finds kernels that Python calls and that are missing here.
 import numpy as np
 
 from ecu.algorithm.brake import brake_gain, brake_gain_per_bar
+from ecu.algorithm.hydraulics import HYDRAULICS_STATE, advance_pressures, learn_lateness
 from ecu.algorithm.monitoring.emission_factor import (
     emission_factor,
     emission_factors,
@@ -50,6 +51,9 @@ def call_every_entry() -> None:
 
 def _call_about_the_brakes(params: np.void) -> None:
     learned = new_record(LEARNED)[0]
+    hydraulics = np.zeros(1, HYDRAULICS_STATE)[0]
+    learn_lateness(params, hydraulics, new_record(INPUTS)[0], np.zeros(4), np.zeros(4, np.int64), 0.0)
+    advance_pressures(params, hydraulics, np.zeros(4))
     restore_wear(params, np.zeros(1, WEAR_STATE)[0], learned)
     mass_by_law(params, learned["wear"]["regressors"], 0)
     for gain in (brake_gain, brake_gain_per_bar):
