@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from brakelab.logs import signal_batches
-from brakelab.logs.column_map import read_column_map
+from brakelab.logs.column_map import ColumnMap, MappedFile, read_column_map
 from brakelab.logs.log_quality import SignalQuality
 from brakelab.logs.signal_file import read_signals
 from ecu.contract.signals import ACCEL_X, INPUT
@@ -61,6 +62,27 @@ def test_dates_and_durations_of_pandas_are_times(tmp_path: Path, kind: Any, star
     path = write(tmp_path / "drive.parquet", {"t": t, "accel_x": [0.5] * 100})
     (block,) = read_signals(path, SignalQuality())
     assert block.t_ns.tolist() == [(start + 10 * k) * 1_000_000 for k in range(100)]
+
+
+@pytest.mark.parametrize("name", [None, "when"])
+@pytest.mark.parametrize("kind", [pd.to_datetime, pd.to_timedelta])
+def test_an_index_of_times_is_the_time(tmp_path: Path, kind: Any, name: str | None) -> None:
+    frame = pd.DataFrame({"accel_x": [0.5] * 100}, kind(np.arange(100) * 10, unit="ms").rename(name))
+    frame.to_parquet(tmp_path / "drive.parquet")
+    (block,) = read_signals(tmp_path / "drive.parquet", SignalQuality())
+    assert (np.diff(block.t_ns) == 10_000_000).all()
+    frame["t"] = np.arange(100) * 0.02  # then it is no longer clear
+    frame.to_parquet(tmp_path / "drive.parquet")
+    (block,) = read_signals(tmp_path / "drive.parquet", SignalQuality())
+    assert (np.diff(block.t_ns) == 20_000_000).all()
+
+
+def test_a_map_reads_an_index_of_times(tmp_path: Path) -> None:
+    path = tmp_path / "drive.parquet"
+    pd.DataFrame({"a": [0.5] * 9}, pd.to_datetime(np.arange(9), unit="s")).to_parquet(path)
+    mapped = {"inputs": {"accel_x": {"column": "a", "unit": "m/s^2"}}}
+    (block,) = read_signals(path, SignalQuality(), MappedFile(path, ColumnMap.model_validate(mapped)))
+    assert (np.diff(block.t_ns) == 1_000_000_000).all()
 
 
 @pytest.mark.parametrize("start", [0.0, -3.7, 1.6e9 + 0.123])

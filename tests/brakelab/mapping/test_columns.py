@@ -269,6 +269,9 @@ def test_names_of_the_contract_need_no_map_but_a_t(
     log.write_text(text.replace("km/h", ""))
     assert cli.main(["map", "suggest", str(log)]) == 2
     assert "or call its time t: the contract's names have" in capsys.readouterr().err
+    log.write_text(log.read_text().replace("Time", "t", 1))
+    assert cli.main(["map", "suggest", str(log)]) == 2
+    assert "or take it as it is: the contract's names have" in capsys.readouterr().err
 
 
 def test_wheel_speeds_without_a_unit_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -77,7 +77,8 @@ def columns_of(path: Path) -> Columns:
     twice = [title for title in schema.names if schema.names.count(title) > 1]
     if twice:
         raise UserError(str(path), "columns", f"column {twice[0]} stands twice; keep one")
-    parts = [split_title(title) for title in schema.names]
+    index = _index_of_times(schema)
+    parts = [split_title("t" if title == index else title) for title in schema.names]
     names = distinct([name for name, _ in parts])
     stated = [(field.metadata or {}).get(b"unit", b"").decode() for field in schema]
     units = {name: unit or behind for name, unit, (_, behind) in zip(names, stated, parts, strict=True)}
@@ -156,23 +157,33 @@ def _names_only(names: list[str]) -> Batch:
 
 def _parquet_rows(path: Path, wanted: list[str] | None, quality: SignalQuality) -> Iterator[Batch]:
     """Yield rows of the columns `wanted`; None: of the inputs, after a batch of all names."""
-    done = 0
+    done, time = 0, None
     try:
         with pq.ParquetFile(path) as source:
             if wanted is None:
                 names = source.schema_arrow.names
-                yield _names_only(names)
+                time = _index_of_times(source.schema_arrow)
+                yield _names_only(["t" if name == time else name for name in names])
                 _note_start(source, quality)
-                wanted = [name for name in names if name == "t" or name in INPUT]
+                wanted = [name for name in names if name in ("t", time) or name in INPUT]
             for batch in _numbered(map(_in_seconds, source.iter_batches(BLOCK_ROWS, columns=wanted))):
                 done += batch.rows.num_rows
-                yield batch
+                called = ["t" if name == time else name for name in batch.rows.schema.names]
+                yield batch._replace(rows=batch.rows.rename_columns(called))
     except (pa.ArrowInvalid, OSError, UnicodeDecodeError) as error:
         reason = str(error).splitlines()[0].rstrip(".")
         if not done:
             remedy = f"no readable Parquet file ({reason}); write it again"
             raise UserError(str(path), "", remedy) from None
         quality.cut = f"row {done}: cannot be read ({reason}), the rest is missing"
+
+
+def _index_of_times(schema: pa.Schema) -> str | None:
+    """Return the column that pandas wrote of an index of times, None: there is none, or a column t."""
+    index = (schema.pandas_metadata or {}).get("index_columns", [])
+    if len(index) != 1 or not isinstance(index[0], str) or "t" in schema.names:
+        return None
+    return index[0] if pa.types.is_temporal(schema.field(index[0]).type) else None
 
 
 def _in_seconds(batch: pa.RecordBatch) -> pa.RecordBatch:
@@ -191,7 +202,7 @@ def _in_seconds(batch: pa.RecordBatch) -> pa.RecordBatch:
 def _note_start(source: pq.ParquetFile, quality: SignalQuality) -> None:
     """Note the date of t = 0 where the metadata has that of the first row, as our own files do."""
     start = (source.metadata.metadata or {}).get(b"start_time_ns", b"").decode("ascii", "replace")
-    if start.isdecimal() and source.metadata.num_rows:
+    if start.isdecimal() and source.metadata.num_rows and "t" in source.schema_arrow.names:
         first = next(source.iter_batches(1, columns=["t"])).column(0)[0].as_py()
         if isinstance(first, float):
             quality.zero_ns = int(start) - round(first * 1e6) * 1000

@@ -126,7 +126,8 @@ def _suggest_columns(log: Path, out: Path | None, car: Car) -> None:
             among += f", of which none has {FEWEST_FRAMES} numbers at times of their own"
         raise UserError(str(log), "", f"{among}; write the map by hand (docs/signal-maps.md)")
     wheel = found[0].series
-    own = "; or call its time t: the contract's names have the contract's units, and need no map"
+    so = "take it as it is" if "t" in columns.names else "call its time t"
+    own = f"; or {so}: the contract's names have the contract's units, and need no map"
     own = own if wheel.signal in INPUT else ""
     _refuse_unitless(log, wheel, f'write it behind the names: "{wheel.signal} [km/h]"{own}', car)
     found = with_lags(found, motion)
