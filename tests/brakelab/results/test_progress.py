@@ -1,5 +1,8 @@
 """Progress where no terminal is: lines, and none for what is short."""
 
+import os
+import subprocess
+import sys
 import time
 
 import pytest
@@ -33,3 +36,14 @@ def test_short_work_and_work_from_python_say_nothing(capsys: pytest.CaptureFixtu
     with progress_bar("replay", 2.0, shown=False) as advance:
         advance(1.0)
     assert capsys.readouterr().err == ""
+
+
+def test_results_go_where_they_were_sent_beside_a_bar_on_the_terminal() -> None:
+    terminal, other_end = os.openpty()
+    text = "from brakelab.results.progress import progress_bar\nwith progress_bar('x', None): print('result')"
+    done = subprocess.run(
+        [sys.executable, "-c", text], stdout=subprocess.PIPE, stderr=other_end, check=True, text=True
+    )
+    os.close(other_end)
+    os.close(terminal)
+    assert done.stdout == "result\n"

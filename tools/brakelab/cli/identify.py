@@ -60,15 +60,18 @@ def wear(
     ] = False,
 ) -> None:
     """Identify the wear law of brake linings from dynamometer blocks. Write a CONFIG."""
-    from brakelab.identify.wear import command, from_drives
+    from brakelab.results.progress import progress_bar
     from ecu.errors import UserError
 
-    if from_logs:
-        from_drives.blocks_from_drives(measured, config, axle, out)
-    elif len(measured) > 1:
+    if len(measured) > 1 and not from_logs:
         raise UserError(str(measured[1]), "", "one MANIFEST.csv; for blocks of drives give --from-logs")
-    else:
-        command.identify_wear(measured[0], config, axle, out, columns)
+    with progress_bar("identify wear", None):
+        from brakelab.identify.wear import command, from_drives
+
+        if from_logs:
+            from_drives.blocks_from_drives(measured, config, axle, out)
+        else:
+            command.identify_wear(measured[0], config, axle, out, columns)
 
 
 @app.command()
@@ -85,10 +88,13 @@ def dust(
     ] = False,
 ) -> None:
     """Identify particle emission from trips with a counter. Write a CONFIG."""
-    from brakelab.identify.dust import command, cycle_page
+    from brakelab.results.progress import progress_bar
 
-    identify = cycle_page.report_cycle if cycle else command.identify_dust
-    identify(manifest, config, axle, out, columns)
+    with progress_bar("identify dust", None):
+        from brakelab.identify.dust import command, cycle_page
+
+        identify = cycle_page.report_cycle if cycle else command.identify_dust
+        identify(manifest, config, axle, out, columns)
 
 
 @app.command()

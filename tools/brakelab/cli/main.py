@@ -269,18 +269,22 @@ def compare(
     out: Annotated[Path | None, option("PAGE.html", "Page of both to write, self-contained")] = None,
 ) -> int:
     """Compare two results, largest difference first. Exit code 1: a difference matters."""
-    from brakelab.results import compare
+    from brakelab.results.progress import progress_bar
 
-    if out is not None:
-        from brakelab.report.page import check_page
+    with progress_bar("compare", None):
+        from brakelab.results import compare
 
-        check_page(out, [a, b])
-    found = compare.find(a, b)
+        if out is not None:
+            from brakelab.report.page import check_page
+
+            check_page(out, [a, b])
+        found = compare.find(a, b)
     compare.show(found, a, b)
     if out is not None:
-        from brakelab.report.comparison import write_page
+        with progress_bar("compare", None):
+            from brakelab.report.comparison import write_page
 
-        write_page(found, a, b, out)
+            write_page(found, a, b, out)
         wrote(out)
     return 1 if found.matter else 0
 

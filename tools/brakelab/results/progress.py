@@ -1,5 +1,6 @@
 """Progress of long work on stderr: a bar on a terminal, elsewhere a line every ten seconds."""
 
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -33,7 +34,9 @@ def progress_bar(text: str, total: float | None, shown: bool = True) -> Iterator
         from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
         columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
-        with Progress(*columns, console=console, transient=True) as progress:
+        with Progress(
+            *columns, console=console, transient=True, redirect_stdout=sys.stdout.isatty()
+        ) as progress:
             task = progress.add_task(text, total=total)
             yield lambda amount: progress.advance(task, amount)
 
