@@ -6,19 +6,15 @@
 It rolls at 25 m/s, asks for 4 m/s^2 after two seconds, and is braked by the pressures that come back.
 """
 
-import math
 import sys
 import time
 
 import can
 
 GAIN = (30.7, 30.7, 10.5, 10.5)  # N m per bar of a wheel: 2 · piston area · effective radius · friction
-MASS, RADIUS, DRAG, ASKED = 2105.0, 0.365, 0.30, 4.0  # kg, m, m/s^2, m/s^2
-# Data IDs by identifier: demands of both axles, and what a car sends at least
-IDS = {
-    0x50: 0x5A01, 0x51: 0x5A12, 0x60: 0x6B01, 0x70: 0x7C01, 0x71: 0x7C12,
-    0x72: 0x7C23, 0x74: 0x7C45, 0x75: 0x7C56, 0x78: 0x7C67,
-}  # fmt: skip
+MASS, RADIUS, DRAG = 2105.0, 0.365, 0.30  # kg, m, m/s^2
+IDS = {0x50: 0x5A01, 0x51: 0x5A12, 0x60: 0x6B01, 0x70: 0x7C01, 0x71: 0x7C12, 0x72: 0x7C23, 0x74: 0x7C45}
+IDS |= {0x75: 0x7C56, 0x78: 0x7C67}  # Data IDs by identifier: both demands, and what a car sends at least
 
 
 def crc(data_id: int, data: bytes) -> int:
@@ -31,54 +27,46 @@ def crc(data_id: int, data: bytes) -> int:
     return value
 
 
-def frame(can_id: int, count: int, *signals: tuple[int, float, float, float]) -> can.Message:
+def frame(can_id: int, count: int, *signals: tuple[int, int, float, float]) -> can.Message:
     """Pack signals (start bit, length, value, scale) of a frame, little-endian; protect it."""
-    bits = count << 8
-    for start, length, value, scale in signals:
-        bits |= (round(value / scale) & (1 << int(length)) - 1) << start
-    payload = bits.to_bytes(8, "little")[1:]
-    return can.Message(
-        arbitration_id=can_id, is_extended_id=False, data=bytes([crc(IDS[can_id], payload)]) + payload
-    )
+    bits = count << 8 | sum((round(value / scale) & (1 << n) - 1) << at for at, n, value, scale in signals)
+    data = bits.to_bytes(8, "little")[1:]
+    return can.Message(arbitration_id=can_id, is_extended_id=False, data=[crc(IDS[can_id], data), *data])
 
 
 def main(interface: str, channel: str) -> None:
     """Drive until the car stands."""
     more = {"hop_limit": 0} if interface == "udp_multicast" else {}  # stay on this machine
-    speed, wanted, pressure, heard = 25.0, [0.0] * 4, [0.0] * 4, {0x50: 0.0, 0x51: 0.0}
+    count, speed, wanted, pressure, heard = 0, 25.0, [0.0] * 4, [0.0] * 4, [0.0] * 2
     began = last = due = time.monotonic()
     with can.Bus(interface=interface, channel=channel, **more) as bus:
-        for period in range(6000):
+        while speed > 0.0:
             while (message := bus.recv(timeout=max(0.0, due - time.monotonic()))) is not None:
-                number, data = message.arbitration_id, bytes(message.data)
-                if number in heard and data[0] == crc(IDS[number], data[1:]):
-                    valid, first = data[1] >> 4 & 3 == 1, 2 * (number - 0x50)
-                    demand = [int.from_bytes(data[k : k + 2], "little") * 0.005 for k in (2, 4)]
-                    wanted[first : first + 2] = demand if valid else [0.0, 0.0]
-                    heard[number] = time.monotonic()
+                axle, data = message.arbitration_id - 0x50, bytes(message.data)
+                if axle in (0, 1) and data[0] == crc(IDS[0x50 + axle], data[1:]):
+                    scale = 0.005 if data[1] >> 4 & 3 == 1 else 0.0  # bar; flagged invalid: none
+                    demand = [scale * int.from_bytes(data[k : k + 2], "little") for k in (2, 4)]
+                    wanted[2 * axle : 2 * axle + 2], heard[axle] = demand, time.monotonic()
             now = time.monotonic()
-            step, last = now - last, now  # 10 ms, more where the machine is late: a car does not wait for it
-            if min(heard.values()) < now - 0.03:
+            step, last, due = now - last, now, max(due + 0.01, now)  # a car does not wait for its computer
+            if now - min(heard) > 0.03:
                 wanted = [0.0] * 4  # no demand for 30 ms: here a car falls back on its pedal
-            part = 1.0 - math.exp(-step / 0.035)
-            pressure = [p + part * (w - p) for p, w in zip(pressure, wanted, strict=True)]
-            torques = [gain * max(p - 0.5, 0.0) for gain, p in zip(GAIN, pressure, strict=True)]
-            decel = (sum(torques) / RADIUS / MASS + DRAG) if speed > 0.0 else 0.0
-            speed, asks = max(0.0, speed - step * decel), ASKED if now - began > 2.0 else 0.0
-            omega = [speed / RADIUS * (1.0 - torque / RADIUS / 1.1e5) for torque in torques]
-            count, due = period % 15, max(due + 0.01, now)
+            pressure = [p + (w - p) * step / (step + 0.035) for p, w in zip(pressure, wanted, strict=True)]
+            torque = [gain * max(p - 0.5, 0.0) for gain, p in zip(GAIN, pressure, strict=True)]
+            decel = sum(torque) / RADIUS / MASS + DRAG
+            speed, asked = max(0.0, speed - step * decel), 4.0 if now - began > 2.0 else 0.0
+            omega = [speed / RADIUS * (1.0 - one / RADIUS / 1.1e5) for one in torque]
             for k in (0, 1):
-                left, right = omega[2 * k : 2 * k + 2]
-                bus.send(frame(0x70 + k, count, (16, 20, left + 20, 0.0005), (36, 20, right + 20, 0.0005)))
-                left, right = pressure[2 * k : 2 * k + 2]
-                bus.send(frame(0x74 + k, count, (16, 16, left + 10, 0.005), (32, 16, right + 10, 0.005)))
+                wheels = [(16 + 20 * i, 20, omega[2 * k + i] + 20, 0.0005) for i in (0, 1)]
+                bus.send(frame(0x70 + k, count, *wheels))
+                bars = [(16 + 16 * i, 16, pressure[2 * k + i] + 10, 0.005) for i in (0, 1)]
+                bus.send(frame(0x74 + k, count, *bars))
             bus.send(frame(0x72, count, (16, 16, -decel, 0.00125)))
             bus.send(frame(0x78, count))
-            bus.send(frame(0x60, count, (14, 2, 1, 1), (29, 14, asks, 0.001)))
-            if period % 50 == 0 or not speed:
+            bus.send(frame(0x60, count, (14, 2, 1, 1), (29, 14, asked, 0.001)))
+            count = (count + 1) % 15
+            if count == 0 or speed == 0.0:
                 print(f"{now - began:5.1f} s {speed:6.2f} m/s {decel:6.2f} m/s² {pressure[0]:6.1f} bar")
-            if not speed:
-                return
 
 
 if __name__ == "__main__":
