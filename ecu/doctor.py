@@ -95,7 +95,7 @@ def machine() -> list[Check]:
     version = sys.version_info[:2]
     return [
         Check("Python", (3, 11) <= version <= (3, 14), platform.python_version(), "use Python 3.11 to 3.14"),
-        *_rights(),
+        *rights(),
         _clock_source(),
         _wake_up(),
         _cache(),
@@ -112,15 +112,20 @@ for verdict in make_realtime():
 """
 
 
-def _rights() -> list[Check]:
-    paths = os.pathsep.join([str(Path(jit.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
+def rights() -> list[Check]:
+    """Ask for the rights of real time."""
+    paths = filter(None, (str(Path(jit.__file__).parents[1]), os.environ.get("PYTHONPATH")))
     asked = subprocess.run(
-        [sys.executable, "-c", _ASK],
+        [sys.executable, "-P", "-c", _ASK],  # not the `ecu` of a clone in which one stands
         capture_output=True,
         text=True,
-        env={**os.environ, "PYTHONPATH": paths},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
         check=False,
     )
+    if asked.returncode:
+        return [
+            Check("real time", False, f"not checked: {asked.stderr.strip()[-200:]}", "mend the installation")
+        ]
     verdicts = (line.split("\t") for line in asked.stdout.splitlines())
     return [
         Check(name, granted == "1", "granted" if granted == "1" else reason, remedy)

@@ -7,7 +7,7 @@ import pytest
 from ecu.bus.receive import new_reception
 from ecu.bus.receive_plan import contract_receive_plan
 from ecu.bus.transmit import contract_transmit_plan
-from ecu.doctor import bit_rate, bus_load, doctor, hydraulics, kernels, machine, messages, unit
+from ecu.doctor import bit_rate, bus_load, doctor, hydraulics, kernels, machine, messages, rights, unit
 from ecu.errors import UserError
 from ecu.recording.ring import RingReader
 from ecu.settings.config import load_config
@@ -115,6 +115,15 @@ def test_without_ip_the_bit_rate_is_unknown(monkeypatch):
 def test_half_a_bus_is_a_bad_argument(arguments):
     with pytest.raises(UserError, match="give both or none"):
         doctor(None, None, *arguments)
+
+
+def test_the_rights_are_asked_for_by_the_program_that_runs_wherever_it_is_called(tmp_path, monkeypatch):
+    (tmp_path / "ecu").mkdir()
+    (tmp_path / "ecu/__init__.py").write_text("raise SystemExit(1)  # a clone's, without its packages\n")
+    monkeypatch.chdir(tmp_path)
+    assert {"SCHED_FIFO", "mlockall"} <= {check.name for check in rights()}
+    monkeypatch.setattr("sys.executable", "/bin/false")
+    assert [(check.name, check.good) for check in rights()] == [("real time", False)]
 
 
 # the unit that is installed -> whether it will do, and what is said
