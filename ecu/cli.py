@@ -241,8 +241,10 @@ def _describe(error: Exception) -> tuple[str, int]:
         case typer.TyperException():
             context = getattr(error, "ctx", None)
             command = context.command_path if context else "brake-ecu"
-            hint = "" if _add_commands() else f"; the laboratory's commands need {OF_REPOSITORY}"
-            return f"{error.format_message().rstrip('.')}; see {command} --help{hint}", error.exit_code
+            said = error.format_message().rstrip(".")
+            lacking = said.startswith("No such command") and not _add_commands()
+            hint = f"; the laboratory's commands need {OF_REPOSITORY}" if lacking else ""
+            return f"{said}; see {command} --help{hint}", error.exit_code
         case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in LABORATORY:
             return f"{name} is missing: this command needs the laboratory, {OF_REPOSITORY}", 2
         case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in (*FLEET, "dask"):

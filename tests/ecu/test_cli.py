@@ -119,6 +119,17 @@ def test_what_a_command_raises_becomes_one_line(
     assert printed.count("\n") == (1 if says else 0)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "hint"), [(["simulate2"], True), (["run", "--state", "none/of/it", "--speed"], False)]
+)
+def test_where_the_laboratory_is_missing_it_is_named_for_its_commands_alone(
+    arguments: list[str], hint: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(cli, "_add_commands", lambda: 0)
+    assert cli.main(arguments) == 2
+    assert ("the laboratory's commands need" in capsys.readouterr().err) == hint
+
+
 def test_debugging_shows_where(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("BRAKE_ECU_DEBUG", "1")
     cli.main(["stop"])
