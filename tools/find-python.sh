@@ -11,7 +11,7 @@ for candidate in ${PYTHON:-python3 python3.14 python3.13 python3.12 python3.11};
                 echo "$candidate"
                 exit 0
             fi
-            bare="$bare $version"
+            case "$bare " in *" $version "*) ;; *) bare="$bare $version" ;; esac
             ;;
         *) found="$found $version" ;;
     esac

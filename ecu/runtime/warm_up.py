@@ -10,7 +10,7 @@ from ecu.bus.socketcan import new_socket
 from ecu.contract.records import RecordArray
 from ecu.contract.signals import CYCLE_NS
 from ecu.jit import CompileCounter
-from ecu.recording.ring import create_ring
+from ecu.recording.ring import create_ring, ring_folder
 from ecu.runtime.clock import Grid, TimeSource, system_time
 from ecu.runtime.cycle import Progress, cycle_once
 from ecu.runtime.exchange import LEAD_NS, exchange
@@ -41,7 +41,7 @@ class Silence:
 def warm_up(ecu: Ecu, compiled: CompileCounter) -> None:
     """Run a few cycles of an identical ECU on a bus of its own, so that every kernel is compiled."""
     twin = new_ecu(ecu.params, None, ecu.receive_plan, ecu.transmit_plan)
-    with tempfile.TemporaryDirectory(prefix="brake-ecu-") as folder:
+    with tempfile.TemporaryDirectory(prefix="brake-ecu-", dir=ring_folder()) as folder:
         ring = create_ring(Path(folder) / "ring", {}, b"", slots=2, frames=1)
         instants = itertools.count(0, CYCLE_NS // 100)
         grid = Grid(TimeSource(instants.__next__, instants.__next__, lambda _: None))

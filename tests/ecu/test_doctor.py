@@ -117,6 +117,12 @@ def test_half_a_bus_is_a_bad_argument(arguments):
         doctor(None, None, *arguments)
 
 
+def test_kernels_are_prepared_where_only_the_folder_of_rings_can_be_written(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "read-only"))
+    plan = contract_receive_plan(DBC)
+    assert kernels(None, plan, contract_transmit_plan(DBC, "BrakeEcu")).found.startswith("from ")
+
+
 def test_the_rights_are_asked_for_by_the_program_that_runs_wherever_it_is_called(tmp_path, monkeypatch):
     (tmp_path / "ecu").mkdir()
     (tmp_path / "ecu/__init__.py").write_text("raise SystemExit(1)  # a clone's, without its packages\n")
