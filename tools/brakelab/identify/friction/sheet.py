@@ -19,7 +19,7 @@ STYLE: Final = (
     ".scroll{overflow-x:auto}svg{width:100%;min-width:640px}.limit{background:#fff4e5;"
     "border-left:4px solid #d55e00;padding:.6em 1em}"
     "@media screen and (prefers-color-scheme:dark){body{background:#14181d;color:#e8ebef}"
-    "td,th{border-color:#323941}.limit{background:#33291a}}"
+    "td,th{border-color:#323941}.limit{background:#33291a}svg{filter:invert(.91)hue-rotate(180deg)}}"
 )
 
 
