@@ -116,10 +116,118 @@ def slow(rows):
     rows[1]["reference"] = rows[0]["reference"]
 
 
+def changed(made: Path, tmp_path: Path, number: int, change) -> Path:
+    """Return the manifest of a run whose trip `number` has other columns."""
+    columns = {
+        name: np.array(values, float)
+        for name, values in pq.read_table(made / f"{number}.parquet").to_pydict().items()
+    }
+    pq.write_table(pa.table(change(columns) or columns), tmp_path / "changed.parquet")
+    return rewritten(
+        made,
+        tmp_path / "r.csv",
+        lambda rows: rows[number - 1].update(file=str(tmp_path / "changed.parquet")),
+    )
+
+
+OWN = """
+[columns]
+time = ["Zeit", "ms"]
+speed = ["v_ist", "km/h"]
+pressure = ["p", "kPa"]
+torque = ["M", "Nm"]
+temperature = ["T", "°F"]
+concentration = ["TPN10", "1/l"]
+flow = ["Q", "m³/h"]
+solid = ["SPN10", "1/l"]
+"""
+
+
+def test_trips_of_other_names_and_units_are_the_same_run(made, tmp_path):
+    """Solid particles included."""
+    (tmp_path / "own.toml").write_text(OWN)
+    names = ("Zeit", "v_ist", "p", "M", "T", "TPN10", "Q", "SPN10")
+    factors = (1e3, 3.6, 100.0, 1.0, 1.8, 1e3, 3600.0, 1e3)
+
+    def renamed(rows):
+        for row in rows[:3]:
+            columns = pq.read_table(row["file"]).to_pydict().values()
+            values = [np.array(column, float) * by for column, by in zip(columns, factors, strict=True)]
+            values[4] += 32.0
+            row["file"] = str(tmp_path / Path(row["file"]).name)
+            pq.write_table(pa.table(dict(zip(names, values, strict=True))), row["file"])
+        return rows[:3]
+
+    config = load_config(CONFIG)
+    as_ours = read_run(rewritten(made, tmp_path / "ours.csv", lambda rows: rows[:3]), config, "front")
+    theirs = read_run(rewritten(made, tmp_path / "r.csv", renamed), config, "front", tmp_path / "own.toml")
+    assert theirs.trips == [
+        type(one)(one.name, *(pytest.approx(value, rel=1e-6) for value in one[1:])) for one in as_ours.trips
+    ]
+
+
+def test_a_unit_of_solid_particles_is_one_of_those_known(made, tmp_path):
+    (tmp_path / "own.toml").write_text(OWN.replace('"SPN10", "1/l"', '"SPN10", "ppm"'))
+    with pytest.raises(UserError, match="unit 'ppm' of solid unknown"):
+        read_run(made / "run.csv", load_config(CONFIG), "front", tmp_path / "own.toml")
+
+
+def test_what_is_of_the_whole_run_may_have_a_row_of_its_own(made, tmp_path):
+    def apart(rows):
+        rows[2] |= dict.fromkeys(WHOLE, "")
+        return [*rows, dict.fromkeys(rows[0], "") | {"trip": "sum"} | WHOLE]
+
+    config = load_config(CONFIG)
+    run = read_run(rewritten(made, tmp_path / "r.csv", apart), config, "front")
+    assert run.whole == read_run(made / "run.csv", config, "front").whole
+    assert len(run.trips) == len(TRIPS)
+
+
+def test_the_background_is_that_of_air_that_was_late(made, tmp_path):
+    """By 20 s, as through a long line: plumes fall into what would be cruising."""
+
+    def late(columns):
+        for name in ("particle_concentration", "solid_concentration"):
+            columns[name] = np.roll(columns[name], 200)
+
+    config = load_config(CONFIG)
+    before = read_run(made / "run.csv", config, "front").trips[2].background
+    after = read_run(changed(made, tmp_path, 3, late), config, "front").trips[2].background
+    assert after == pytest.approx(before, rel=0.02)
+
+
+def warmer(columns):
+    columns["disc_temperature_fr"] += 60.0
+
+
+def ends_early(columns):
+    columns["particle_concentration"] = np.roll(columns["particle_concentration"], 80)
+    last = np.flatnonzero(columns["brake_torque_fr"] > 100.0)[-1] + 30
+    return {name: values[:last] for name, values in columns.items()}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [(warmer, "disc over 5 K too warm at the start of trip 3"), (ends_early, "trip 3: its file ends")],
+)
+def test_a_trip_that_was_not_run_as_asked_is_found(made, tmp_path, change, said):
+    run = read_run(changed(made, tmp_path, 3, change), load_config(CONFIG), "front")
+    assert any(said in line for line in findings(run)), findings(run)
+
+
 FOUND = {
     "a trip missing": (lambda rows: rows[:-1], "9 of 10 trips"),
     "no filter": (lambda rows: rows[2].update(pm10_filter="", pm10_flow=""), "PM10 was not weighed"),
     "no reference": (lambda rows: rows[4].update(reference=""), "no reference of every trip"),
+    "masses in kg": (
+        lambda rows: rows[2].update(
+            pads_mass_before="0.8124",
+            pads_mass_after="0.8109",
+            disc_mass_before="9.12",
+            disc_mass_after="9.1186",
+        ),
+        "% of what pads and disc lost",
+    ),
     "fifty times the dust": (lambda rows: rows[2].update(pm10_filter="60"), "above every limit"),
 }
 
@@ -161,6 +269,11 @@ BAD = {
     ),
     "filters exchanged": (lambda rows: rows[2].update(pm25_filter="1.9"), "more than PM10"),
     "a filter in µg": (lambda rows: rows[2].update(pm10_filter="1200"), "1200 mg on a filter cannot be"),
+    "a flow in l/min": (
+        lambda rows: rows[2].update(pm10_flow="9.6", pm25_flow="9.6"),
+        "9.6 m.3/s drawn of 0.25 m.3/s",
+    ),
+    "a trip twice": (lambda rows: rows[4].update(file=rows[3]["file"]), "is the trip of line 5"),
     "pads that gained": (lambda rows: rows[2].update(pads_mass_after="815"), "pads gained mass"),
     "c in %": (lambda rows: rows[2].update(friction_share="50"), "50 is not of 0 to 1"),
     "another trip's reference": (slow, "ref1.csv: t: 1200 s, the trip 900 s"),

@@ -17,6 +17,7 @@ from ecu.settings.config import load_config
 
 CYCLE: Final = "UN GTR 24, as Grigoratos et al. 2020 (doi 10.3390/atmos11121309) have it"
 DISTANCE_OFF: Final = 0.01  # of the distance, from which on it is said
+WARMER: Final = 5.0  # K of a disc at the start of a trip, likewise. Assumption
 TOLERANCE: Final = "assumed, as the WLTP on a chassis dynamometer has it"
 NOT_OBTAINED: Final = (
     "The text of UN Regulation 179 (OJ L, 2026/1044, of 18 May 2026; ECE/TRANS/WP.29/2026/36) and of UN GTR "
@@ -104,9 +105,24 @@ def findings(run: Run) -> list[str]:
     if abs(km / asked - 1.0) > DISTANCE_OFF:
         found.append(f"{km:.1f} of {asked:.0f} km")
     if (outside := run.sum_of("outside")) > 0.0:
-        found.append(f"{outside:.0f} s outside of the speed's tolerance")
+        found.append(f"{outside:.1f} s outside of the speed's tolerance")
     if not np.isfinite(outside):
         found.append("no reference of every trip: speed violations are not known")
+    begins = zip(run.trips, DISC_AT_START, strict=False)
+    if warm := [trip.name for trip, asked in begins if trip.cold > asked + WARMER]:
+        found.append(
+            f"disc over {WARMER:.0f} K too warm at the start of trip {', '.join(warm)}: soaked too short"
+        )
+    for trip in run.trips:
+        if trip.unseen > 0.0:
+            found.append(
+                f"trip {trip.name}: its file ends {trip.unseen:.0f} s before the air of its last brake "
+                "application is at the counter; record on"
+            )
+    if _airborne(run) > 100.0:
+        found.append(
+            f"PM10 is {_airborne(run):.0f} % of what pads and disc lost: masses in g, filters in mg, flows?"
+        )
     if euro7.above_all(run.mass("pm10")):
         found.append(f"PM10 of this brake alone is above every limit of a car ({run.mass('pm10'):.1f} mg/km)")
     if not np.isfinite(run.mass("pm10")):

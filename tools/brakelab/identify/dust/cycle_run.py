@@ -1,8 +1,9 @@
 """Report on one's own run of the WLTP-Brake cycle, for UN Regulation 179 (`identify dust --cycle`).
 
 RUN.csv has a row a trip, in order: `trip`, `file` (as for `identify dust`, with `solid_concentration`
-[1/cm^3] where solid particles were counted, too) and `reference`, a file of `t` [s] and `vehicle_speed`
-[m/s] as prescribed. What is of the whole run stands in one of its rows: `pm10_filter`, `pm25_filter` [mg],
+[1/cm^3], or `solid` of a file of columns, where solid particles were counted, too) and `reference`, a file of
+`t` [s] and `vehicle_speed` [m/s] as prescribed. What is of the whole run stands in one of its rows, or in one
+without a file: `pm10_filter`, `pm25_filter` [mg],
 gained; `pm10_flow`, `pm25_flow` [m^3/s], drawn through them; `pads_mass_before`, `pads_mass_after`,
 `disc_mass_before`, `disc_mass_after` [g]; `friction_share`, c of this car.
 
@@ -18,16 +19,28 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
+from pydantic import ValidationError, field_validator
 
 from brakelab.arrays import Array
-from brakelab.identify.dust.features import PERIOD, Recorded, find_applications, find_background
-from brakelab.identify.dust.reader import MOST_COUNT, off_count, on_grid, read_trip, trip_columns
+from brakelab.identify.dust.features import (
+    PERIOD,
+    Recorded,
+    aligned,
+    find_applications,
+    find_background,
+    transport_time,
+)
+from brakelab.identify.dust.reader import IN_ORDER, MOST_COUNT, off_count, on_grid, read_trip
+from brakelab.identify.friction.columns import Column, Columns, Names
+from brakelab.identify.friction.reader import in_si
 from brakelab.identify.manifest import read_manifest, refuse_row
 from brakelab.identify.measurement_files import read_columns
+from brakelab.identify.units import COUNTED
 from brakelab.simulation.trip.wltp_brake import TRIPS
 from brakelab.stretches import stretches
 from ecu.errors import UserError
 from ecu.settings.config import Config
+from ecu.settings.toml_file import describe, read_toml
 
 NEAR_SPEED: Final = 2.0 / 3.6
 NEAR_S: Final = 1.0
@@ -36,8 +49,27 @@ WHOLE: Final = (
     "pm10_filter", "pm25_filter", "pm10_flow", "pm25_flow", "pads_mass_before", "pads_mass_after",
     "disc_mass_before", "disc_mass_after", "friction_share",
 )  # fmt: skip
-SOLID: Final = "solid_concentration"
+SOLID: Final = ("solid_concentration", "1/cm^3")
 HEAVIEST_FILTER: Final = 100.0  # mg; a run gains 0.1 to 10
+
+
+class RunNames(Names):
+    """Columns of a run's trips."""
+
+    solid: Column = SOLID
+
+    @field_validator("solid")
+    @classmethod
+    def _unit(cls, solid: Column) -> Column:
+        if solid[1] not in (units := COUNTED["concentration"]):
+            raise ValueError(f"unit {solid[1]!r} of solid unknown; one of {', '.join(units)}")
+        return solid
+
+
+class RunColumns(Columns):
+    """A file of columns of a run."""
+
+    columns: RunNames
 
 
 class TripRun(NamedTuple):
@@ -63,6 +95,8 @@ class TripRun(NamedTuple):
     background: float
     """Of them, by cruising."""
     solid: float
+    unseen: float
+    """s by which the air of the last application still was in the line when the file ended."""
 
 
 class Run(NamedTuple):
@@ -104,27 +138,52 @@ def read_run(manifest: Path, config: Config, axle: str, given: Path | None = Non
     Raises:
         UserError: a file, a row or a value of it is invalid.
     """
-    columns = trip_columns(config, axle, given)
+    columns = run_columns(config, axle, given)
     trips, whole = [], dict.fromkeys(WHOLE, math.nan)
     rows = read_manifest(manifest, given)
     if not rows:
         raise UserError(str(manifest), "", f"no trips; give a row for each of {len(TRIPS)}")
+    seen: dict[str, int] = {}
     for line, row in rows:
         where = f"line {line}"
+        for name in WHOLE:
+            if row.get(name):
+                whole[name] = _stated(manifest, f"{where}, {name}", row[name], whole[name])
+        if not row.get("file") and any(row.get(name) for name in WHOLE):
+            continue
         if not row.get("trip") or not row.get("file"):
             raise refuse_row(manifest, line, row, "trip and file")
+        if (before := seen.setdefault(row["file"], line)) != line:
+            raise UserError(str(manifest), where, f"{row['file']} is the trip of line {before}")
         path = manifest.parent / row["file"]
         trip = read_trip(path, row["trip"], False, columns)
         if not trip.counted.all():
             remedy = f"{off_count(trip)}; the sum needs all of the cycle"
             raise UserError(str(path), "particle_concentration", remedy)
         reference = manifest.parent / row["reference"] if row.get("reference") else None
-        trips.append(_run(path, trip, reference, columns.brake.tyre_radius))
-        for name in WHOLE:
-            if row.get(name):
-                whole[name] = _stated(manifest, f"{where}, {name}", row[name], whole[name])
+        trips.append(_run(path, trip, reference, columns))
     _check(manifest, whole)
-    return Run(trips, whole)
+    run = Run(trips, whole)
+    tunnel = run.sum_of("air") / run.sum_of("seconds")
+    for name in ("pm10_flow", "pm25_flow"):
+        if whole[name] > tunnel:
+            remedy = f"{whole[name]:g} m^3/s drawn of {tunnel:.3g} m^3/s in the tunnel: l/min? give m^3/s"
+            raise UserError(str(manifest), name, remedy)
+    return run
+
+
+def run_columns(config: Config, axle: str, given: Path | None) -> RunColumns:
+    """Return what describes the files of a run's trips, of a brake of an `axle`: `given`, else the contract.
+
+    Raises:
+        UserError: the file of columns is invalid.
+    """
+    parts = {"brake", "rig", "disc"} if given else None
+    stated = Columns.contract(IN_ORDER, "m/s", config, axle).model_dump(include=parts)
+    try:
+        return RunColumns.model_validate(stated | (read_toml(given) if given else {}))
+    except ValidationError as error:
+        raise describe(error, str(given), RunColumns) from None
 
 
 def _stated(manifest: Path, place: str, cell: str, before: float) -> float:
@@ -165,17 +224,15 @@ def _check(manifest: Path, whole: dict[str, float]) -> None:
         raise UserError(str(manifest), "friction_share", f"{whole['friction_share']:g} is not of 0 to 1")
 
 
-def _run(path: Path, trip: Recorded, reference: Path | None, radius: float) -> TripRun:
+def _run(path: Path, trip: Recorded, reference: Path | None, columns: RunColumns) -> TripRun:
     violations, outside = -1, math.nan
     if reference is not None:
         violations, outside = speed_violations(trip, reference)
     applications = find_applications(trip)
-    try:
-        ground = find_background(trip, applications).at(trip.speed)
-    except UserError:  # nothing cruises: what is counted cannot be divided
-        ground = np.full(len(trip.t), np.nan)
     air = PERIOD * trip.flow
-    work = 1e-6 * PERIOD * float(trip.torque @ trip.speed) / radius
+    work = 1e-6 * PERIOD * float(trip.torque @ trip.speed) / columns.brake.tyre_radius
+    delay, ground = _ground(trip)
+    after = PERIOD * (len(trip.t) - applications[-1][1]) if applications else math.inf
     return TripRun(
         trip.name,
         1e-3 * PERIOD * float(trip.speed.sum()),
@@ -188,28 +245,45 @@ def _run(path: Path, trip: Recorded, reference: Path | None, radius: float) -> T
         outside,
         float(air.sum()),
         1e6 * float(air @ trip.concentration),
-        1e6 * float(air @ ground),
-        _solid(path, trip, air),
+        1e6 * float(air.sum()) * ground,
+        _solid(path, trip, air, columns),
+        max(delay - after, 0.0),
     )
 
 
-def _solid(path: Path, trip: Recorded, air: Array) -> float:
-    """Return the solid particles of a trip; NaN: not counted."""
+def _ground(trip: Recorded) -> tuple[float, float]:
+    """Return the delay of the air [s] and the mean background [1/cm^3], NaN where nothing cruises."""
     try:
-        columns = read_columns(path, ("t", SOLID), "trip", counts=(SOLID,))
+        delay = transport_time(trip)
+    except UserError:  # what is counted follows no braking
+        delay = 0.0
+    late = aligned(trip, delay)
+    try:
+        return delay, float(find_background(late, find_applications(late)).at(late.speed).mean())
+    except UserError:
+        return delay, math.nan
+
+
+def _solid(path: Path, trip: Recorded, air: Array, columns: RunColumns) -> float:
+    """Return the solid particles of a trip; NaN: not counted."""
+    (time, _), (name, unit) = columns.columns.time, columns.columns.solid
+    try:
+        read = read_columns(
+            path, (time, name), "trip", counts=(name,), stated=(time, name) == ("t", SOLID[0])
+        )
     except UserError as error:
-        if error.place == SOLID and "no such" in error.remedy:
+        if error.place == name and "no such" in error.remedy and (name, unit) == SOLID:
             return math.nan
         raise
-    t = columns["t"]
-    counted = on_grid(path, SOLID, t, columns[SOLID], t[0] + trip.t)
+    t = in_si(columns, "time", read[time])
+    counted = COUNTED["concentration"][unit] * on_grid(path, name, t, read[name], t[0] + trip.t)
     if counted.min() < 0.0 or np.median(counted) > MOST_COUNT:
         raise UserError(
-            str(path), SOLID, f"{counted.min():.3g} to {counted.max():.3g} cannot be 1/cm^3 of air"
+            str(path), name, f"{counted.min():.3g} to {counted.max():.3g} cannot be 1/cm^3 of air"
         )
     solid = 1e6 * float(air @ counted)
     if solid > 1e6 * float(air @ trip.concentration):
-        raise UserError(str(path), SOLID, "more than all particles; are the columns exchanged?")
+        raise UserError(str(path), name, "more than all particles; are the columns exchanged?")
     return solid
 
 
