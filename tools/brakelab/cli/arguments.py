@@ -26,6 +26,12 @@ def loading(words: str) -> Iterator[None]:
         yield
 
 
+def recorded(given: list[Path] | None) -> list[Path] | None:
+    """Return given files and folders, each of which is there."""
+    present([path for path in given or [] if not path.is_dir()])
+    return given
+
+
 Plant = Annotated[
     str | None,
     option(

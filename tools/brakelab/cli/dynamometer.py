@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any
 
-from brakelab.cli.arguments import Columns, loading, present
+from brakelab.cli.arguments import Columns, loading, recorded
 from ecu.arguments import Commands, argument, option
 from ecu.completion import fitting, shipped
 from ecu.settings.resources import resource
@@ -63,7 +63,8 @@ def run(
 @app.command()
 def look(
     data: Annotated[
-        list[Path], argument("DATA", "Recordings of one brake: .csv .parquet .mf4", callback=present)
+        list[Path],
+        argument("DATA", "Recordings of one brake, or folders: .csv .parquet .mf4", callback=recorded),
     ],
     columns: Columns = None,
 ) -> None:
@@ -76,10 +77,14 @@ def look(
 
 @app.command()
 def report(
-    data: Annotated[Path, argument("DATA", "Recording of a programme: .csv .parquet .mf4", callback=present)],
-    other: Annotated[
-        Path | None, argument("[DATA2]", "Recording of another lining, compared with it", callback=present)
-    ] = None,
+    data: Annotated[
+        list[Path],
+        argument(
+            "DATA",
+            "Recording, or folder of its files, of a programme; two: compared; more: parts of one",
+            callback=recorded,
+        ),
+    ],
     out: Annotated[Path | None, option("REPORT.html", "Page to write, with the charts")] = None,
     columns: Columns = None,
     programme: Annotated[
@@ -95,7 +100,7 @@ def report(
     with loading("lab report"):
         from brakelab.identify.friction.report import report as report_of
 
-    return report_of(data, other, columns, programme, out)
+    return report_of(data, columns, programme, out)
 
 
 @app.command()

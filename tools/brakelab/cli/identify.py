@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakelab.cli.arguments import Columns, loading, present
+from brakelab.cli.arguments import Columns, loading, present, recorded
 from ecu.arguments import Commands, Config, Map, argument, flag, option
 
 app = Commands(help="Identify models from your own measurements.", no_args_is_help=True)
@@ -18,7 +18,7 @@ def _identify() -> None:
 def friction(
     data: Annotated[
         list[Path],
-        argument("DATA", "Recordings of one brake on a dynamometer: .csv .parquet .mf4", callback=present),
+        argument("DATA", "Recordings of one brake, or folders: .csv .parquet .mf4", callback=recorded),
     ],
     out: Annotated[Path, option("BRAKE.toml", "Lining file to write, for the simulated vehicle")],
     columns: Columns = None,

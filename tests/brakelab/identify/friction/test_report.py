@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from brakelab.identify.friction import command
+from brakelab.identify.friction.recording import HEADER
 from ecu import cli
 
 PROGRAMME = """
@@ -76,6 +77,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, brake, seed in (("one", "A", 1), ("two", "A", 2), ("third", "C", 1)):
         command.run(str(programme), brake, seed, folder / f"{name}.parquet")
     command.run("ams", "A", 1, folder / "ams.csv")
+    (folder / "empty").mkdir()
     return folder
 
 
@@ -180,6 +182,43 @@ def test_a_column_of_sections_is_read(folder: Path, capsys: pytest.CaptureFixtur
     assert "Schritt: no such column" in capsys.readouterr().err
 
 
+@pytest.fixture(scope="module")
+def stops(folder: Path) -> Path:
+    """Return a folder with a file a stop, as another rig writes them; beside it the file of columns."""
+    stops = folder / "stops"
+    stops.mkdir()
+    table = pq.read_table(folder / "one.parquet").to_pandas()
+    table["stop"] = (table["time_s"].diff() > 2.0).cumsum() + 1
+    for number, rows in table.groupby("stop"):
+        lines = ["Prüfstand;3", f"Bremsung;{number}", "", "Zeit;Druck;Moment;v;T", "s;bar;Nm;km/h;°C"]
+        of = rows.assign(time_s=rows["time_s"] - rows["time_s"].iloc[0]).drop(columns="stop")
+        lines += [";".join(f"{cell:.3f}" for cell in row).replace(".", ",") for row in of.to_numpy()]
+        (stops / f"AKM_{number}.csv").write_bytes("\r\n".join(lines).encode("latin-1"))
+    text = (folder / "one.toml").read_text("utf-8")
+    for ours, theirs in zip(HEADER, ("Zeit", "Druck", "Moment", "v", "T"), strict=True):
+        text = text.replace(f'"{ours}"', f'"{theirs}"')
+    (folder / "stops.toml").write_text(text, "utf-8")
+    return stops
+
+
+def test_a_file_a_stop_is_a_recording(stops: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A folder of them, or one after the other as a shell writes them: AKM_1, AKM_10, … AKM_2."""
+    whole = given("lab report one.parquet --programme short-programme.toml", capsys)
+    names = " ".join(sorted(f"stops/{path.name}" for path in stops.iterdir()))
+    assert names.startswith("stops/AKM_1.csv stops/AKM_10.csv")
+    for data in ("stops", f"{names} --columns stops.toml"):
+        found = given(f"lab report {data} --programme short-programme.toml", capsys)
+        one, other = (of["recordings"][0]["stops"] for of in (whole, found))
+        assert [stop["section"] for stop in one] == [stop["section"] for stop in other]
+        assert [stop["mu"] for stop in other] == pytest.approx([stop["mu"] for stop in one], abs=1e-3)
+    compared = given("lab report stops one.parquet --programme short-programme.toml", capsys)["compared"]
+    assert [row["pairs"] for row in compared] == [*(int(count) for count in COUNTS), 20]
+
+
+def test_a_folder_is_looked_at(stops: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert given("lab look stops", capsys)["stops"] == 20
+
+
 def test_a_shipped_programme_is_recognised(capsys: pytest.CaptureFixture[str]) -> None:
     found = given("lab report ams.csv", capsys)
     assert found["programme"] == "AMS"
@@ -209,6 +248,7 @@ def test_speeds_of_no_such_programme_are_said(
         ("lab report one.parquet --programme nothing", "nothing: no such file, and none that is shipped"),
         ("lab report ams.csv --programme ak-master", "only 1 of 6 stops are of it; give --programme"),
         ("lab report one.parquet --programme one.toml", "one.toml: "),
+        ("lab report empty", "empty: is a folder without recordings; give files of .csv"),
         ("lab report one.parquet --out one.txt", "let the name end in .html"),
         ("lab report one.parquet --out one.parquet", "let the name end in .html"),
         ("lab report one.parquet ams.csv --programme short-programme.toml", "ams.csv: short: only"),

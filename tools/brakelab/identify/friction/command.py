@@ -3,11 +3,9 @@
 from pathlib import Path
 from typing import Final, NamedTuple
 
-import numpy as np
 from rich.console import Console
 
 from brakelab.identify.friction.analysis import history_effect, principal_components
-from brakelab.identify.friction.check import refuse_nonsense
 from brakelab.identify.friction.choice import hottest, identify, known_candidates, ties
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.discovered_law import discovered_law
@@ -16,8 +14,7 @@ from brakelab.identify.friction.fit import fit
 from brakelab.identify.friction.heat_capacity import SLOW, UNSHOWN, heat_capacity, undelayed
 from brakelab.identify.friction.lining_file import write_lining
 from brakelab.identify.friction.page import write_report
-from brakelab.identify.friction.reader import read_recording
-from brakelab.identify.friction.recording import Recording, check_name, joined, write_recording
+from brakelab.identify.friction.recording import check_name, write_recording
 from brakelab.identify.friction.sequence import read_sequence, run_sequence
 from brakelab.identify.friction.stops import Stops, find_stops, say_dead
 from brakelab.identify.friction.tables import (
@@ -29,6 +26,7 @@ from brakelab.identify.friction.tables import (
     profile_table,
     residual_table,
 )
+from brakelab.identify.friction.whole import inputs_of, read_whole
 from brakelab.plant.description import PlantFileError, read_file
 from brakelab.plant.linings import Lining, Linings
 from brakelab.results.outputs import check_outputs, write_text
@@ -41,10 +39,6 @@ from ecu.settings.resources import named, resource
 FEWEST_STOPS: Final = 10
 """Stops that identification needs."""
 HELD_OUT: Final = "the fifth of the stops that begins hottest"
-SINGLE_S: Final = 60.0
-"""A shorter recording may be of a single stop, hot from its begin: such are judged together."""
-BETWEEN: Final = 600.0
-"""s between recordings."""
 
 
 def run(
@@ -121,8 +115,7 @@ def friction(
     """
     page = out.with_suffix(".html")
     recordings = [*data, *([held_out] if held_out else [])]
-    described_by = [columns or path.with_suffix(".toml") for path in recordings]
-    read = [*recordings, *described_by, *map(Path, own)]
+    read = [*inputs_of(recordings, columns), *map(Path, own)]
     check_outputs(out, (out, page), read, toml=True)
     if discover is not None:
         if discover.suffix != ".py":
@@ -196,33 +189,11 @@ class _Measured(NamedTuple):
 
 def _read(data: list[Path], columns: Path | None) -> _Measured:
     """Return the stops of recordings of one brake, one after the other."""
-    parts: list[Recording] = []
-    short: list[int] = []
-    first: Columns | None = None
-    heating = []
-    for place, path in enumerate(data):
-        read = read_recording(path, columns)
-        if read.damaged:
-            say(read.damaged)
-        if first is None:
-            first = read.columns
-        elif (read.columns.brake, read.columns.rig) != (first.brake, first.rig):
-            raise UserError(
-                str(path), "brake, rig", f"differ from those of {data[0]}; identify one brake at a time"
-            )
-        if np.ptp(read.recording.time) < SINGLE_S:
-            short.append(place)
-        else:
-            heating.append(refuse_nonsense(read.recording, read.columns, str(path)).heating)
-        begin = parts[-1].time[-1] + BETWEEN if parts else 0.0
-        parts.append(read.recording._replace(time=read.recording.time - read.recording.time[0] + begin))
-    assert first is not None
-    if short:
-        where = f"{data[short[0]]}{f' and {len(short) - 1} more' if len(short) > 1 else ''}"
-        heating.append(refuse_nonsense(joined([parts[place] for place in short]), first, where).heating)
-    stops = find_stops(joined(parts), first, str(data[0]))
+    whole = read_whole(data, columns)
+    time = whole.recording.time
+    stops = find_stops(whole.recording._replace(time=time - time[0]), whole.columns, str(data[0]))
     say_dead(stops, str(data[0]))
-    return _Measured(first, stops, float(np.median(heating)))
+    return _Measured(whole.columns, stops, whole.heating)
 
 
 def _need(stops: Stops, path: Path) -> None:

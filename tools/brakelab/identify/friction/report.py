@@ -5,9 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from brakelab.identify.friction.check import refuse_nonsense
 from brakelab.identify.friction.comparison import compare, comparison_table
-from brakelab.identify.friction.reader import read_recording
 from brakelab.identify.friction.report_page import write_report_page
 from brakelab.identify.friction.report_tables import (
     Measured,
@@ -19,6 +17,7 @@ from brakelab.identify.friction.report_tables import (
 from brakelab.identify.friction.sections import conditions_of, find_sections, number_of, speed_ratio
 from brakelab.identify.friction.sequence import Sequence, load_sequence, read_sequence
 from brakelab.identify.friction.stops import find_stops, say_dead
+from brakelab.identify.friction.whole import inputs_of, read_whole
 from brakelab.results.console import new_console
 from brakelab.results.outputs import check_outputs
 from brakelab.results.text_table import show
@@ -30,39 +29,36 @@ DOUBTFUL_SPEED: Final = 0.08
 """Share by which most stops begin faster or slower than the programme asks, that is no rig's tolerance."""
 ENOUGH: Final = 0.5
 """Share of the stops of a recording that must be of a section."""
+TWO: Final = 2
+"""Recordings that are compared."""
 
 
-def report(
-    data: Path, other: Path | None, columns: Path | None, programme: str | None, out: Path | None
-) -> int:
-    """Print the tables of a recorded programme, of `other` beside it, and write a page to `out`. Returns 0.
+def report(data: list[Path], columns: Path | None, programme: str | None, out: Path | None) -> int:
+    """Print the tables of a recorded programme, of two beside each other, and write a page to `out`.
+    Returns 0.
 
-    `columns` describes both recordings, default: the file beside each; `programme`: a file or a name of
-    config/rig, default: the one of those shipped that most of the stops are of.
+    A recording is a file or a folder; three and more of `data` are parts of one. `columns` describes all,
+    default: the file beside each; `programme`: a file or a name of config/rig, default: the one of those
+    shipped that most of the stops are of.
 
     Raises:
         UserError: a file cannot be read or makes no physical sense, or is of no such programme; one line.
     """
-    paths = [data, *([other] if other else [])]
     if out is not None:
         if out.suffix != ".html":
             raise UserError("--out", str(out), "is written as HTML; let the name end in .html")
-        check_outputs(out, (out,), [*paths, *(columns or path.with_suffix(".toml") for path in paths)])
-    known = _programmes(programme)
-    first = _measure(data, columns, known)
-    recordings = [first[1]]
-    title = f"{first[0].title}, {first[1].name}"
-    if other is not None:
-        recordings.append(_measure(other, columns, [first[0]])[1])
-        if data.stem == other.stem:
-            recordings = [one._replace(name=str(path)) for one, path in zip(recordings, paths, strict=True)]
-            title = f"{first[0].title}, {data}"
-        title += f" and {recordings[1].name}"
+        check_outputs(out, (out,), inputs_of(data, columns))
+    one, *others = [[path] for path in data] if len(data) <= TWO else [data]
+    first = _measure(one, columns, _programmes(programme))
+    recordings = [first[1], *(_measure(other, columns, [first[0]])[1] for other in others)]
+    if others and recordings[0].name == recordings[1].name:
+        recordings = [each._replace(name=str(path)) for each, path in zip(recordings, data, strict=True)]
+    title = f"{first[0].title}, {' and '.join(each.name for each in recordings)}"
     tables = []
-    for one in recordings:
-        tables += [section_table(f"{first[0].title}, {one.name}", one), characteristics(one)]
-        tables.append(line_table(one))
-    if other is not None:
+    for each in recordings:
+        tables += [section_table(f"{first[0].title}, {each.name}", each), characteristics(each)]
+        tables.append(line_table(each))
+    if others:
         first_of, second_of = recordings
         compared = compare(first_of, second_of)
         tables.append(comparison_table(first_of, second_of, compared))
@@ -70,7 +66,7 @@ def report(
     tables = [table for table in tables if table.rows]
     for table in tables:
         show(new_console(), table)
-    give(programme=first[0].title, recordings=[_as_rows(one) for one in recordings])
+    give(programme=first[0].title, recordings=[_as_rows(each) for each in recordings])
     if out is not None:
         write_report_page(out, title, recordings, tables)
         wrote(out)
@@ -83,12 +79,10 @@ def _programmes(named_one: str | None) -> list[Sequence]:
     return [read_sequence(named(named_one, "config/rig"))]
 
 
-def _measure(path: Path, columns: Path | None, known: list[Sequence]) -> tuple[Sequence, Measured]:
+def _measure(data: list[Path], columns: Path | None, known: list[Sequence]) -> tuple[Sequence, Measured]:
     """Return the programme of `known` that a recording is of, and what is measured of it."""
-    read = read_recording(path, columns)
-    if read.damaged:
-        say(read.damaged)
-    refuse_nonsense(read.recording, read.columns, str(path))
+    read = read_whole(data, columns)
+    path = data[0] if len(data) == 1 else data[0].parent
     stops = find_stops(read.recording, read.columns, str(path))
     say_dead(stops, str(path))
     labels = read.sections[np.searchsorted(read.recording.time, stops.begin)]
@@ -105,7 +99,7 @@ def _measure(path: Path, columns: Path | None, known: list[Sequence]) -> tuple[S
             f"{path}: the stops begin at {off:.2f} times the speeds of {sequence.title}: check the unit of "
             "speed and the tyre radius; of a programme of other speeds give --programme"
         )
-    return sequence, measured(path.stem, stops, read.columns, parts, outside)
+    return sequence, measured(path.stem or read.columns.name, stops, read.columns, parts, outside)
 
 
 def _as_rows(of: Measured) -> dict[str, object]:
