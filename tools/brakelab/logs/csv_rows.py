@@ -1,10 +1,13 @@
 """Reads CSV text into columns of text, a block of whole lines at a time, so that every row knows its line.
 
 Cells stand between commas, semicolons or tabs, whichever the line of names has; with semicolons or tabs, and
-in quotes, a decimal comma is a point, and what separates thousands is left out. A line that is damaged is
-skipped and counted; a last line that is not whole is not used.
+in quotes, a decimal comma is a point, and what separates thousands is left out: which of the two a mark is
+follows from lines all over the file. `1,202` alone, with nothing beside it that tells, is 1.202 between
+semicolons, which stand there because commas are decimal, and 1202 in quotes between commas. A line that is
+damaged is skipped and counted; a last line that is not whole is not used.
 """
 
+import csv
 import io
 import re
 from collections.abc import Iterator
@@ -21,6 +24,13 @@ from ecu.errors import UserError
 
 BLOCK_BYTES: Final = 1 << 20
 _BLANK: Final = re.compile(rb"(?m)^\r?\n")
+SAMPLES: Final = 16  # places of a file whose lines show how its numbers are written
+SAMPLE_BYTES: Final = 1 << 14
+THOUSANDS: Final = 3  # digits
+_OTHER: Final = {",": ".", ".": ","}
+_BOTH: Final = re.compile(r"[-+]?\d{1,3}(?:([.,])\d{3})(?:\1\d{3})*(?!\1)[.,]\d*")
+_GROUPED: Final = re.compile(r"[-+]?[1-9]\d{0,2}([.,])\d{3}(?:\1\d{3})*")
+_PLAIN: Final = re.compile(r"[-+]?(\d*)([.,]?)\d*")
 _NO_SAMPLE: Final = ["", "null", "NULL", "NA"]
 
 
@@ -58,6 +68,9 @@ def csv_rows(
     """
     line, rest, too_long = skipped + 1, b"", False
     pointed = decimal_comma or delimiter != ","
+    marks: dict[str, str] | None = None
+    if pointed or _quotes(path):  # in quotes a comma stands within a cell
+        marks = _grouped_marks(path, names, delimiter, wanted, skipped, pointed)
     with path.open("rb") as stream:
         for _ in range(skipped):
             stream.readline()
@@ -67,50 +80,94 @@ def csv_rows(
                 chunk, too_long = chunk[end + 1 :] if end >= 0 else b"", end < 0
             whole, newline, rest = (rest + chunk).rpartition(b"\n")
             if newline:
-                yield _parsed(whole + newline, line, names, wanted, delimiter, pointed, damage)
+                yield _parsed(whole + newline, line, names, wanted, delimiter, marks, damage)
                 line += whole.count(b"\n") + 1
             if len(rest) >= BLOCK_BYTES:
                 damage.note_damage(1, f"line {line}")
                 rest, too_long, line = b"", True, line + 1
     if rest.strip():
         last = Damage()
-        yield _parsed(rest + b"\n", line, names, wanted, delimiter, pointed, last)
+        yield _parsed(rest + b"\n", line, names, wanted, delimiter, marks, last)
         if last.damaged:
             damage.cut = f"line {line}: the last line is cut off and was not used"
 
 
-def _pointed(column: "pa.Array[Any]") -> "pa.Array[Any]":
-    """Return cells with a decimal point; `1.234,5` and `1,234.5` are numbers with thousands."""
-    import pyarrow.compute as pc  # see `signal_batches`
-
-    for thousands, point in ((".", ","), (",", ".")):
-        grouped = rf"^\s*[-+]?\d{{1,3}}(\{thousands}\d{{3}})+\{point}\d*\s*$"
-        if pc.any(pc.match_substring_regex(column, grouped)).as_py():
-            column = pc.replace_substring(column, thousands, "")
-    return pc.replace_substring(column, ",", ".")
+def _quotes(path: Path) -> bool:
+    with path.open("rb") as stream:
+        return b'"' in stream.read(BLOCK_BYTES)
 
 
-def _without_groups(columns: list["pa.Array[Any]"]) -> list["pa.Array[Any]"]:
-    """Return columns, those of whole numbers without the mark of thousands, `987` and `1.234`.
+def _grouped_marks(
+    path: Path, names: list[str], delimiter: str, wanted: list[str], skipped: int, pointed: bool
+) -> dict[str, str]:
+    """Return the marks by which whole numbers of columns `wanted` are grouped, by lines from all over.
 
-    A point is one where other columns have decimal commas, and the reverse.
+    `1.234` is grouped where other columns have decimal commas and its own has no `0.5`; where they have both
+    or none, only beside `987`, or in quotes between commas. `1.234,5` says it of itself, wherever it is.
     """
+    cells: dict[str, set[str]] = {name: set() for name in wanted}
+    places = {name: place for place, name in enumerate(names)}
+    for row in csv.reader(_some_lines(path, skipped), delimiter=delimiter):
+        for name in wanted:
+            if places[name] < len(row):
+                cells[name].add(row[places[name]].strip())
+    seen = {name: {_form(cell) for cell in found} for name, found in cells.items()}
+    decimal = {mark for forms in seen.values() for form, mark in forms if form == "decimal"}
+    decimal |= {_OTHER[mark] for forms in seen.values() for form, mark in forms if form == "both"}
+    marks: dict[str, str] = {}
+    for name, forms in seen.items():
+        for mark in ",.":
+            if decimal == {_OTHER[mark]}:
+                sure = True
+            elif decimal == {mark} or (mark == "." and not decimal):
+                sure = False
+            else:
+                beside = ("grouped", mark) in forms and ("whole", "") in forms
+                sure = (beside or (not decimal and not pointed)) and ("long", "") not in forms
+            if sure and ("decimal", mark) not in forms:
+                marks[name] = mark
+    return marks
+
+
+def _some_lines(path: Path, skipped: int) -> Iterator[str]:
+    """Yield lines of text from places all over a file."""
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        for place in range(SAMPLES):
+            stream.seek(size * place // SAMPLES)
+            lines = stream.read(SAMPLE_BYTES).split(b"\n")
+            for line in lines[skipped if not place else 1 : None if size < SAMPLE_BYTES else -1]:
+                if line.count(b'"') % 2 == 0:
+                    yield line.decode("latin-1").rstrip("\r")
+
+
+def _form(cell: str) -> tuple[str, str]:
+    """Return how a number is written, and its mark: whole, long, decimal, grouped or both; else ""."""
+    if found := _BOTH.fullmatch(cell):
+        return "both", found[1]
+    if found := _GROUPED.fullmatch(cell):
+        return "grouped", found[1]
+    found = _PLAIN.fullmatch(cell)
+    if found is None or not any(map(str.isdecimal, cell)):
+        return "", ""
+    if found[2]:
+        return "decimal", found[2]
+    return ("whole" if len(found[1]) <= THOUSANDS else "long"), ""
+
+
+def _plain(column: "pa.Array[Any]", grouped: str, both: bool) -> "pa.Array[Any]":
+    """Return cells with a decimal point and without marks of thousands, `grouped` or beside the other."""
     import pyarrow.compute as pc  # see `signal_batches`
 
-    def some(column: "pa.Array[Any]", form: str) -> bool:
-        return bool(pc.any(pc.match_substring_regex(column, form)).as_py())
-
-    for thousands, point in ((".", ","), (",", ".")):
-        if not any(some(column, rf"^\s*[-+]?\d+\{point}\d+\s*$") for column in columns):
-            continue
-        grouped = rf"[1-9]\d{{0,2}}(\{thousands}\d{{3}})+"
-        for place, column in enumerate(columns):
-            whole = pc.match_substring_regex(column, rf"^\s*[-+]?(\d{{1,3}}|{grouped})\s*$")
-            if pc.all(whole).as_py() and all(
-                some(column, rf"^\s*[-+]?{form}\s*$") for form in (r"\d{1,3}", grouped)
-            ):
-                columns[place] = pc.replace_substring(column, thousands, "")
-    return columns
+    forms = [(grouped, "")] if grouped else []
+    forms += [(mark, rf"\{point}\d*") for mark, point in _OTHER.items() if both]
+    for mark, end in forms:
+        found = pc.match_substring_regex(column, rf"^\s*[-+]?\d{{1,3}}(\{mark}\d{{3}})+{end}\s*$")
+        if pc.any(found).as_py():
+            if not end:
+                found = pc.and_(found, pc.invert(pc.match_substring_regex(column, r"^\s*[-+]?0")))
+            column = pc.if_else(found, pc.replace_substring(column, mark, ""), column)
+    return pc.replace_substring(column, ",", ".")
 
 
 def _parsed(
@@ -119,10 +176,11 @@ def _parsed(
     names: list[str],
     wanted: list[str],
     delimiter: str,
-    pointed: bool,
+    marks: dict[str, str] | None,
     damage: Damage,
 ) -> tuple[NDArray[np.int64], pa.RecordBatch]:
-    """Parse whole lines, of which the first has the number `line`."""
+    """Parse whole lines, of which the first has the number `line`; `marks` of thousands where commas stand
+    within cells."""
     # A quote that is never closed would swallow all that follows, a CR alone would end a line.
     if b'"' in text or text.count(b"\r") != text.count(b"\r\n"):
         pieces = text.split(b"\n")[:-1]
@@ -157,8 +215,7 @@ def _parsed(
         damage.note_damage(len(wrong), f"line {lines[row]} ({reason})")
         lines = np.delete(lines, [row for row, _ in wrong])
     columns = [table.column(name).combine_chunks() for name in wanted]
-    if pointed or b'"' in text:  # in quotes a comma stands within a cell
-        if b"," in text and b"." in text:
-            columns = _without_groups(columns)
-        columns = [_pointed(column) for column in columns]
+    if marks is not None or b'"' in text:
+        given, both = [(marks or {}).get(name, "") for name in wanted], b"," in text and b"." in text
+        columns = [_plain(column, mark, both) for column, mark in zip(columns, given, strict=True)]
     return lines, pa.RecordBatch.from_arrays(columns, names=wanted)
