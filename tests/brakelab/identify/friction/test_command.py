@@ -129,9 +129,19 @@ def test_a_law_of_one_s_own_must_have_a_name_of_its_own(tmp_path: Path) -> None:
     own.write_text(
         'NUMBERS = {"mu": ("–", 0.1, 0.8)}\n\n\ndef step(numbers, memory, *u):\n    return memory, 0.4\n'
     )
-    command.run("ams", "A", 0, data)
+    command.run("cpc", "A", 0, data)
     with pytest.raises(UserError, match="ilvo: two laws of this name"):
-        command.friction([data, data], None, None, tmp_path / "out.toml", own=(str(own),))
+        command.friction([data], None, None, tmp_path / "out.toml", own=(str(own),))
+
+
+def test_a_recording_counts_once_and_does_not_judge_its_own_law(tmp_path: Path) -> None:
+    """Whatever it is called by, and in a folder, too."""
+    data, out = tmp_path / "rig" / "ams.csv", tmp_path / "out.toml"
+    command.run("ams", "A", 0, data)
+    with pytest.raises(UserError, match=r"ams\.csv: is given twice; a recording counts once"):
+        command.look([data, data.parent / "." / ".." / "rig" / "ams.csv"], None)
+    with pytest.raises(UserError, match=r"--held-out: .*cannot be judged by it; give another programme"):
+        command.friction([data.parent], None, data, out)
 
 
 @pytest.mark.parametrize(

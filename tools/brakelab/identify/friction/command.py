@@ -26,7 +26,7 @@ from brakelab.identify.friction.tables import (
     profile_table,
     residual_table,
 )
-from brakelab.identify.friction.whole import inputs_of, read_whole
+from brakelab.identify.friction.whole import files_of, inputs_of, read_whole
 from brakelab.plant.description import PlantFileError, read_file
 from brakelab.plant.linings import Lining, Linings
 from brakelab.results.outputs import check_outputs, write_text
@@ -83,6 +83,7 @@ def run(
 
 def look(data: list[Path], columns: Path | None) -> None:
     """Print principal components, the effect of the previous stop and the disc's heat."""
+    _refuse_twice(data)
     measured = _read(data, columns)
     stops = measured.stops
     _need(stops, data[0])
@@ -117,6 +118,7 @@ def friction(
     recordings = [*data, *([held_out] if held_out else [])]
     read = [*inputs_of(recordings, columns), *map(Path, own)]
     check_outputs(out, (out, page), read, toml=True)
+    _refuse_twice(data, held_out)
     if discover is not None:
         if discover.suffix != ".py":
             raise UserError("--discover", str(discover), "is written as Python; let the name end in .py")
@@ -194,6 +196,25 @@ def _read(data: list[Path], columns: Path | None) -> _Measured:
     stops = find_stops(whole.recording._replace(time=time - time[0]), whole.columns, str(data[0]))
     say_dead(stops, str(data[0]))
     return _Measured(whole.columns, stops, whole.heating)
+
+
+def _refuse_twice(data: list[Path], held_out: Path | None = None) -> None:
+    """Refuse a recording that would count twice, or judge the law that is made of it.
+
+    Raises:
+        UserError: names the file.
+    """
+    seen: set[Path] = set()
+    for path, _ in files_of(data, None):
+        if path.resolve() in seen:
+            raise UserError(str(path), "", "is given twice; a recording counts once")
+        seen.add(path.resolve())
+    for path, _ in files_of([held_out] if held_out else [], None):
+        if path.resolve() in seen:
+            remedy = (
+                f"{path}: a law is made of it and cannot be judged by it; give another programme, or none"
+            )
+            raise UserError("--held-out", "", remedy)
 
 
 def _need(stops: Stops, path: Path) -> None:
