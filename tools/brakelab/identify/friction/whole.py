@@ -11,6 +11,7 @@ from brakelab.identify.friction.check import refuse_nonsense
 from brakelab.identify.friction.columns import Columns
 from brakelab.identify.friction.reader import PLACES, Labels, read_recording
 from brakelab.identify.friction.recording import Recording, joined
+from brakelab.identify.friction.sensors import refuse_hung
 from ecu.errors import UserError
 from ecu.output import say
 
@@ -93,6 +94,10 @@ def read_whole(data: Sequence[Path], columns: Path | None) -> Whole:
             short.append(place)
         else:
             heating.append(refuse_nonsense(read.recording, read.columns, str(path)).heating)
+            shown = np.where(
+                read.recording.torque == 0.0, np.nan, read.recording.torque
+            )  # dead stops are said
+            refuse_hung(read.recording._replace(torque=shown), read.columns, str(path), ("torque",))
         begin = parts[-1].time[-1] + BETWEEN if parts else 0.0
         shifted = read.recording.time - read.recording.time[0] + begin
         parts.append(read.recording._replace(time=shifted) if len(files) > 1 else read.recording)
