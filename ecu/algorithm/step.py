@@ -236,7 +236,7 @@ def step(params: Record, state: Record, inputs: Record, outputs: Record) -> None
     s.trusted = u
     share_pressures(p, s.trusted)
     begin_watch(s.witness, dt)
-    stuck = correct_flags(p, s.flags, s.witness, s.trusted, s.estimate, s.application.braking != 0, dt)
+    stuck = correct_flags(p, s.flags, s.witness, s.accel_error, s.trusted, s.estimate, s.application, dt)
     u = s.trusted
     faults, contradicted = watch_sensors(p, s, u, dt)
     faults |= stuck | u.bus_faults | u.e2e_faults | input_faults(p, u)

@@ -4,14 +4,25 @@ reverse        believed if it is set below `ENGAGED` and while the car is slower
                as the wheels do not gain speed where the accelerometer reads forwards: backwards they lose it.
 ABS, ESP       stand for `LONGEST_S` without a wheel beyond `SLIPS` of slip; an ESP in a bend for five times
                as long, an ABS that has no brake to release for a third.
-accelerator    that does not move through two brakings is at its rest, which is taken off.
+accelerator    that does not move through two brakings is at its rest, which is taken off. While the car
+               brakes, and the torques of motors, which have been shown to drive it alone, are all reported,
+               it says nothing that they do not: where none drives, it is taken for 0 once it
+               has been pressed for `THROUGH_S`: a driver who releases the brakes presses it before they are.
 """
 
 import math
 
 import numpy as np
 
-from ecu.algorithm.inputs import fresh, mean_wheel_speed, usable
+from ecu.algorithm.inputs import (
+    ACCELERATES,
+    fresh,
+    mean_wheel_speed,
+    motor_torque,
+    motor_torque_known,
+    usable,
+)
+from ecu.algorithm.monitoring.accel_error import PROVEN_S
 from ecu.algorithm.monitoring.witness import compare, leave_out
 from ecu.algorithm.vehicle import corner_speed
 from ecu.contract.faults import IMPLAUSIBLE
@@ -20,6 +31,7 @@ from ecu.contract.signals import (
     ACCEL_X,
     ACCELERATOR_POSITION,
     ESP_ACTIVE,
+    MOTOR_TORQUE,
     REVERSE,
     WHEEL_SPEED,
 )
@@ -41,6 +53,7 @@ FLAGS_STATE = np.dtype(
         ("brake_s", "f8"),  # duration of this braking
         ("low", "f8"),  # least position in it [%]
         ("still_s", "f8"),  # time for which it was within `STEADY` above that
+        ("pressed_s", "f8"),  # time for which it has been pressed in this braking
         ("last", "f8"),  # position through the last braking, NaN: it moved [%]
     ],
     align=True,
@@ -59,7 +72,7 @@ RELEASED = 3.0  # times as fast
 LEAST_SPEED = 3.0  # m/s, for slip
 STEADY, THROUGH_S = 0.5, 1.0  # %, s
 THROUGH = 0.7  # of a braking: a foot moves on before the brakes are released
-RESTS_BELOW = 5.0  # %
+DRIVES = 60.0  # N m of a motor, beyond its noise
 
 
 @kernel
@@ -157,13 +170,24 @@ def _watch_accelerator(state: Record, inputs: Record, braking: bool, dt: float) 
 
 
 @kernel
+def _none_drives(witness: Record, inputs: Record) -> bool:
+    """Return whether every motor reports its torque and is believed, and none drives."""
+    none = True
+    for i in range(4):
+        known = motor_torque_known(inputs, i) and not witness.rejected[MOTOR_TORQUE + i]
+        none = none and known and motor_torque(inputs, i) > -DRIVES
+    return none
+
+
+@kernel
 def correct_flags(
     params: Record,
     state: Record,
     witness: Record,
+    lines: Record,
     inputs: Record,
     estimate: Record,
-    braking: bool,
+    application: Record,
     dt: float,
 ) -> int:
     """Overwrite flags that cannot be in `inputs`; return the fault bits.
@@ -172,12 +196,13 @@ def correct_flags(
         params: `PARAMS`.
         state: `FLAGS_STATE`, overwritten.
         witness: `WITNESS_STATE`; what is published of the four is overwritten.
+        lines: `ACCEL_ERROR_STATE`.
         inputs: `INPUTS`, whose four values are overwritten.
         estimate: `ESTIMATE` of the last cycle.
-        braking: a brake application lasts.
+        application: `APPLICATION_STATE`.
         dt: time since the last cycle [s].
     """
-    faults, value = 0, inputs.value
+    faults, value, braking = 0, inputs.value, application.braking != 0
     _watch_reverse(params, state, witness, inputs, dt)
     if _set(inputs, REVERSE) and not state.reverse:
         faults |= REVERSE_BIT
@@ -200,9 +225,14 @@ def correct_flags(
         value[ESP_ACTIVE] = 0.0
         leave_out(witness, ESP_ACTIVE)
     _watch_accelerator(state, inputs, braking, dt)
-    compare(witness, ACCELERATOR_POSITION, state.rest, RESTS_BELOW)
+    compare(witness, ACCELERATOR_POSITION, state.rest, ACCELERATES)
     if state.rest > 0.0:
-        if state.rest > RESTS_BELOW:
+        if state.rest > ACCELERATES:
             faults |= ACCELERATOR_BIT
         value[ACCELERATOR_POSITION] = max(value[ACCELERATOR_POSITION] - state.rest, 0.0)
+    pressed = braking and value[ACCELERATOR_POSITION] > ACCELERATES
+    state.pressed_s = state.pressed_s + dt if pressed else 0.0
+    alone = lines.proven_s > PROVEN_S and estimate.speed > LEAST_SPEED
+    if state.pressed_s > THROUGH_S and alone and _none_drives(witness, inputs):
+        value[ACCELERATOR_POSITION] = 0.0
     return faults

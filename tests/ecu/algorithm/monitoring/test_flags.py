@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from ecu.algorithm.estimate import ESTIMATE
+from ecu.algorithm.monitoring.accel_error import ACCEL_ERROR_STATE
+from ecu.algorithm.monitoring.application import APPLICATION_STATE
 from ecu.algorithm.monitoring.flags import FLAGS_STATE, LONGEST_S, correct_flags
 from ecu.algorithm.monitoring.witness import WITNESS_STATE
 from ecu.contract.faults import IMPLAUSIBLE
@@ -19,7 +21,8 @@ class Car:
         self.params, self.feed, self.inputs = params[0], feed, feed()
         self.state, self.estimate = np.zeros(1, FLAGS_STATE)[0], np.zeros(1, ESTIMATE)[0]
         self.state["last"] = np.nan
-        self.witness = np.zeros(1, WITNESS_STATE)[0]
+        self.witness, self.lines = np.zeros(1, WITNESS_STATE)[0], np.zeros(1, ACCEL_ERROR_STATE)[0]
+        self.application = np.zeros(1, APPLICATION_STATE)[0]
         self.speed, self.across, self.clock = speed, 0.0, 0.0
         self.random = np.random.default_rng(1)
         self.said: list[int] = []
@@ -31,7 +34,7 @@ class Car:
             seconds: duration.
             turns: of wheel rr over the car's.
             wavy: amplitude of the longitudinal acceleration at 0.5 Hz [m/s^2].
-            braking: as `correct_flags` takes it.
+            braking: a brake application lasts.
             reads: one input and its value.
         """
         self.said = []
@@ -44,8 +47,16 @@ class Car:
             wheels = abs(self.speed) / self.params["wheel_radius"] * np.array([1, 1, 1, turns])
             noise = 0.05 * self.random.standard_normal(5)
             self.feed(self.inputs, wheel_speed=wheels + noise[:4], accel_x=accel + noise[4], **reads)
+            self.application["braking"] = braking
             said = correct_flags(
-                self.params, self.state, self.witness, self.inputs[0], self.estimate, braking, DT
+                self.params,
+                self.state,
+                self.witness,
+                self.lines,
+                self.inputs[0],
+                self.estimate,
+                self.application,
+                DT,
             )
             self.said.append(said)
             lost += DT * (self.inputs[0]["value"][INPUT[name]] != value)
@@ -102,8 +113,8 @@ def test_a_controller_that_has_no_wheel_to_hold_is_not_believed_for_ever(
 
 def test_an_accelerator_that_does_not_move_through_two_brakings_is_at_rest(params, feed) -> None:
     car = Car(params, feed, 20.0)
-    for read in (20.0, 17.0, 17.0):
-        car.drive(2.0, braking=True, accelerator_position=3.0)
+    for read in (20.0, 18.5, 18.5):
+        car.drive(2.0, braking=True, accelerator_position=1.5)
         car.drive(1.0, accelerator_position=20.0)
         assert car.inputs[0]["value"][INPUT["accelerator_position"]] == pytest.approx(read)
     assert not any(car.said)
@@ -132,10 +143,48 @@ def test_a_foot_that_moves_on_before_the_brakes_are_released_hides_no_rest(
     assert car.inputs[0]["value"][INPUT["accelerator_position"]] == read
 
 
-def test_an_accelerator_far_from_zero_at_rest_is_reported(params, feed) -> None:
+@pytest.mark.parametrize("position", [3.0, 50.0])
+def test_an_accelerator_whose_rest_reads_pressed_is_reported(params, feed, position) -> None:
     car = Car(params, feed, 20.0)
     for _ in range(2):
-        car.drive(2.0, braking=True, accelerator_position=50.0)
-        car.drive(1.0, accelerator_position=50.0)
+        car.drive(2.0, braking=True, accelerator_position=position)
+        car.drive(1.0, accelerator_position=position)
     assert car.said[-1] & IMPLAUSIBLE["accelerator_position"]
     assert car.inputs[0]["value"][INPUT["accelerator_position"]] == 0.0
+
+
+STANDS = [
+    # case, motors have been shown to drive alone, torque of each [N m] or None: lost, left out, car's speed,
+    # braking, read
+    ("no motor drives", True, 0.0, False, 20.0, True, 0.0),
+    ("motors brake", True, 200.0, False, 20.0, True, 0.0),
+    ("motors drive", True, -200.0, False, 20.0, True, 50.0),
+    ("torque is lost", True, None, False, 20.0, True, 50.0),
+    ("a torque is left out", True, 0.0, True, 20.0, True, 50.0),
+    ("an engine may drive too", False, 0.0, False, 20.0, True, 50.0),
+    ("the car stands", True, 0.0, False, 0.0, True, 50.0),
+    ("brakes are released", True, 0.0, False, 20.0, False, 50.0),
+]
+
+
+@pytest.mark.parametrize(
+    ("case", "alone", "torque", "left_out", "speed", "braking", "read"), STANDS, ids=[c[0] for c in STANDS]
+)
+def test_an_accelerator_says_nothing_that_motors_do_not(
+    params, feed, case, alone, torque, left_out, speed, braking, read
+) -> None:
+    """While the car brakes: the feet may be on both pedals, or the sensor wrong; nothing drives the car."""
+    car = Car(params, feed, speed)
+    car.lines["proven_s"] = 3.0 if alone else 0.0
+    place = INPUT["motor_torque_fl"]
+    if left_out:
+        car.witness["rejected"][place] = 1
+    car.feed(car.inputs, motor_torque=-300.0)
+    if torque is None:
+        car.inputs[0]["verdict"][place] = 0
+    else:
+        car.feed(car.inputs, motor_torque=torque)
+    car.drive(0.9, braking=braking, accelerator_position=50.0)
+    assert car.inputs[0]["value"][INPUT["accelerator_position"]] == 50.0
+    car.drive(0.2, braking=braking, accelerator_position=50.0)
+    assert car.inputs[0]["value"][INPUT["accelerator_position"]] == read
