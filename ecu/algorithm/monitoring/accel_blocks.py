@@ -86,6 +86,12 @@ def wheels_accel(mean: Record, j: int) -> float:
 
 
 @kernel
+def smooth_accel(mean: Record) -> float:
+    """Return dv/dt over the last four blocks [m/s^2]."""
+    return float((mean[0, W] - mean[3, W]) / (3.0 * BLOCK_S))
+
+
+@kernel
 def rolled_accel(state: Record) -> float:
     """Return d(omega r)/dt over the last blocks, of all wheels [m/s^2]; 0 without two of them."""
     mean = state.mean

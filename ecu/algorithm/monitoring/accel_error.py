@@ -25,7 +25,7 @@ import math
 
 import numpy as np
 
-from ecu.algorithm.monitoring.accel_blocks import BLOCK_S, ROLLED, SHOWN, A, F, W
+from ecu.algorithm.monitoring.accel_blocks import BLOCK_S, ROLLED, SHOWN, A, F, W, smooth_accel
 from ecu.algorithm.monitoring.accel_timing import ACCEL_TIMING_STATE
 from ecu.algorithm.monitoring.error_line import (
     LINE_STATE,
@@ -61,6 +61,7 @@ ACCEL_ERROR_STATE = np.dtype(
         ("stood_s", "f8"),
         ("zero_off", "f8"),  # taken off the reading [m/s^2]
         ("scale_off", "f8"),  # of it
+        ("scaled_s", "f8"),  # time for which wheels and another witness have shown it, at most `REPORTED_S`
         ("scale_beyond", "f8"),  # of it, by the speed over ground too, beyond `SOUND`: not reported yet
         ("ground", "f8"),  # what the vehicle speed usually reads above the wheels, of it
         ("ground_s", "f8"),  # learning time of that [s]
@@ -111,12 +112,6 @@ def accel_unknown(state: Record) -> bool:
 
 
 @kernel
-def _wheels_accel(mean: Record) -> float:
-    """Return dw/dt over the last blocks [m/s^2]."""
-    return float((mean[0, W] - mean[3, W]) / (3.0 * BLOCK_S))
-
-
-@kernel
 def _scale_usual(line: Record, moved: float) -> bool:
     """Return whether a scale that has `moved` from the usual one may still be that."""
     return bool(line.scale_s < FEWEST_SCALE_S or abs(moved) < USUAL * SCALE_DOUBT)
@@ -128,7 +123,7 @@ def _follow_wheels(state: Record, mean: Record) -> None:
     line = state.wheels
     widen_line(line.now, SLOPE_WALK, SCALE_WALK)
     change = abs(mean[0, F] - mean[2, F])
-    h = _wheels_accel(mean)
+    h = smooth_accel(mean)
     if abs(h) < LEAST_SHOWN:
         h = 0.0  # noise of the wheels would show as a scale
         doubted = accel_doubted(state) or state.rolls_wrong != 0 or line.now.p[1] > SCALE_KNOWN**2
@@ -146,7 +141,7 @@ def _follow_wheels(state: Record, mean: Record) -> None:
 @kernel
 def wheels_confirm(state: Record, mean: Record, moved: float) -> bool:
     """Return whether the wheels show what the reading has moved by [m/s^2], at the present deceleration."""
-    h, beside = _wheels_accel(mean), moved_offset(state.wheels)
+    h, beside = smooth_accel(mean), moved_offset(state.wheels)
     if abs(h) > LEAST_SHOWN:
         beside += moved_scale(state.wheels) * h
     return bool(beside * moved > CONFIRMED * moved * moved)
@@ -339,7 +334,9 @@ def follow_accel_error(
     shown = by_ground if abs(by_ground) > abs(shown) else shown
     compare(witness, ACCEL_X, shown * LEAST_SHOWN, SCALE_DOUBT * LEAST_SHOWN)
     still = state.scale_off != 0.0 and abs(by_wheels) > KEPT * SCALE_DOUBT
-    state.scale_off = by_wheels if still or abs(shown) > SCALE_DOUBT else 0.0
+    shows = BLOCK_S if abs(shown) > SCALE_DOUBT else -BLOCK_S
+    state.scaled_s = min(max(state.scaled_s + shows, 0.0), REPORTED_S)
+    state.scale_off = by_wheels if still or state.scaled_s > REPORTED_S - 0.5 * BLOCK_S else 0.0
     state.scale_beyond = math.copysign(max(abs(by_ground) - SOUND, 0.0), by_ground)
 
 

@@ -258,3 +258,15 @@ def test_a_slope_that_begins_as_the_car_brakes_is_in_no_usual_scale(params, feed
         usual.append(float(car.state["wheels"]["usual"]["scale"]))
     print(usual)
     assert usual[1] == pytest.approx(usual[0], abs=0.015)
+
+
+@pytest.mark.parametrize(("blocks", "off"), [(3, 0.0), (4, 0.05)])
+def test_a_scale_that_a_few_blocks_show_is_none_yet(params, feed, blocks: int, off: float) -> None:
+    car = Car(params, feed)
+    car.drive(48.0)
+    for line in ("wheels", "torques"):
+        car.state[line]["now"]["scale"] = car.state[line]["usual"]["scale"] + 0.05
+    car.blocks["good_blocks"] = car.blocks["known_blocks"] = 0
+    for _ in range(blocks):
+        follow_accel_error(car.p, car.state, car.witness, car.blocks, 0.0, math.nan, False)
+    assert car.state["scale_off"] == pytest.approx(off)
