@@ -9,7 +9,8 @@ slow enough (w = `MEMORY`, faster while it begins) that a speed that jumps, stic
 it behind by i. A slope that begins, or an accelerometer that drifts, leaves both behind. The one whose i is
 less than `CONFIRMED` of the other's is confirmed: two of three witnesses.
 
-The wheels' speed is their mean without the slip of the configured tyres.
+The wheels' speed is their mean without the slip of the configured tyres. Where some of a car that is driven
+turn faster than the slowest by more than `SPINS`, they spin: they stay as far behind as they were.
 """
 
 import math
@@ -34,6 +35,7 @@ MEMORY = 0.15  # rad/s
 BEGINS, LEAST_AGE_S = 1.5, 0.5  # over the time since it began; s
 CONFIRMED = 0.4
 KNOWN_S = 5.0  # after which its slope is known
+SPINS, SPINS_BY = 0.08, 0.5  # of the speed, m/s: beyond the slip at which a tyre on a dry road gives most
 LEAST_BEHIND = 0.1  # m/s: slip and radii that differ from the configured ones
 
 
@@ -63,7 +65,7 @@ def follow_carried(state: Record, k: int, speed: float, accel: float, dt: float)
 
 @kernel
 def carry_speeds(
-    params: Record, state: Record, implied: Record, accel: float, known: bool, dt: float
+    params: Record, state: Record, implied: Record, accel: float, known: bool, driven: bool, dt: float
 ) -> None:
     """Let the accelerometer carry the wheels' speed and the vehicle speed on, where it is `known`.
 
@@ -73,13 +75,19 @@ def carry_speeds(
         implied: car's speed by the four wheels and the vehicle speed [m/s]; NaN: silent.
         accel: of the car [m/s^2].
         known: it is.
+        driven: the car is.
         dt: time since the last cycle [s].
     """
-    total, wheels = 0.0, 0
+    total, wheels, slowest, fastest = 0.0, 0, math.inf, 0.0
     for i in range(4):
         if math.isfinite(implied[i]):
             total, wheels = total + implied[i], wheels + 1
-    rolled = total / wheels * (1.0 + tyre_slip(params, accel)) if known and wheels > 2 else math.nan
+            slowest, fastest = min(slowest, implied[i]), max(fastest, implied[i])
+    spin = driven and fastest > (1.0 + SPINS) * slowest + SPINS_BY
+    rolled = total / max(wheels, 1) * (1.0 + tyre_slip(params, accel))
+    if spin and state.age_s[WHEELS] > 0.0:
+        rolled = state.speed[WHEELS] + state.behind[WHEELS]
+    rolled = rolled if known and wheels > 2 else math.nan
     over_ground = implied[4] if known else math.nan
     follow_carried(state, WHEELS, rolled, accel, dt)
     follow_carried(state, OVER_GROUND, over_ground, accel, dt)

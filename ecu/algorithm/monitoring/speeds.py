@@ -93,6 +93,7 @@ TORQUE = 60.0  # N m, above which a wheel is braked or driven
 RECKON, SLOPE_RECKON = 0.8, 0.16  # 1/s, 1/s^2: critically damped at 0.4 rad/s
 RECKON_REACH = 0.04  # of the speed, greatest innovation
 AWAY = 0.02  # of the speed, dead reckoning above wheels beyond which they do not tell a lag
+BY_ONE_AXLE = 2.0  # times the slip of a car that all wheels drive
 LEAVES = 0.5 * SLID  # of the speed: reckoning and wheels that slip by `SLID` have this median
 SPINS, SPINS_BY = 0.15, 2.0  # of the speed, m/s: more than a grade that begins moves the reckoning by
 
@@ -151,20 +152,15 @@ def _over_ground_tells(state: Record, witness: Record, median: float, braked: bo
     """Return whether the vehicle speed stands for the wheels: it is confirmed, or no wheel is believed."""
     if not math.isfinite(state.implied[SPEED]) or witness.rejected[VEHICLE_SPEED]:
         return False
-    wheels = 0
-    for i in range(4):
-        if math.isfinite(state.implied[i]) and not witness.rejected[_place(i)]:
-            wheels += 1
     confirmed = over_ground_confirmed(state.carried) and not _may_slip(state, median, braked, drives)
-    return wheels == 0 or confirmed
+    return confirmed or _believed(state, witness) == 1 << SPEED
 
 
 @kernel
 def _wheels_left(state: Record, median: float) -> bool:
     """Return whether braked wheels' median is below the car's speed, and no vehicle speed agrees with it."""
-    speed = state.implied[SPEED]
     below = median < (1.0 - LEAVES) * state.reckoned
-    left: bool = state.started != 0 and below and not speed < 0.5 * (median + state.reckoned)
+    left: bool = state.started != 0 and below and not state.implied[SPEED] < 0.5 * (median + state.reckoned)
     return left
 
 
@@ -194,23 +190,24 @@ def _reckon(state: Record, witness: Record, estimate: Record, median: float, lef
 
 @kernel
 def _judged(
-    state: Record, i: int, ground: float, free: bool, braked: bool, driven: bool, drives: bool
+    state: Record, i: int, ground: float, free: bool, braked: bool, driven: bool, drives: bool, slip: float
 ) -> float:
     """Return by how much input `i` contradicts the others, over the speed; NaN: nothing is said of it.
 
     Where wheels slip together the median, `ground`, slips with them: dead reckoning and vehicle speed count.
-    Without a vehicle speed an axle that is slower while the car is driven (`drives`) may be one that is not.
+    Without a vehicle speed an axle that is slower while the car is driven (`drives`) may be one that is not;
+    with one that is not confirmed, as far as those that drive it `slip`.
     """
     apart: float = state.apart[i] - state.base[i]
     if free:
         return apart
     if i < SPEED:
         reckoned, speed = state.reckoned / ground, state.implied[SPEED] / ground
-        rolls = False
-        if not math.isfinite(speed):
-            speed, rolls = 1.0, drives and state.apart[i ^ 1] - state.base[i ^ 1] < 0.5 * apart
+        alike = state.apart[i ^ 1] - state.base[i ^ 1] < 0.5 * apart
+        rolls = drives and alike and math.isnan(speed)
+        speed = 1.0 if math.isnan(speed) else speed
         faster = apart + 1.0 - max(reckoned, speed, 1.0)
-        slower = apart + 1.0 - min(reckoned, speed, 1.0)
+        slower = apart + 1.0 - min(reckoned, speed, 1.0) + (slip if alike else 0.0)
         if faster > 0.0 and not driven:
             return faster
         return slower if slower < 0.0 and not braked and not rolls else math.nan
@@ -285,7 +282,7 @@ def watch_speeds(
         braked = braked or state.torque[i] > TORQUE
         drives = drives or motor_torque(inputs, i) < -TORQUE
     seen = estimate.measured != 0 and not estimate.backwards and dt < OVERSLEPT_S
-    carry_speeds(params, state.carried, state.implied, accel, seen, dt)
+    carry_speeds(params, state.carried, state.implied, accel, seen, drives, dt)
     tells = _over_ground_tells(state, witness, median, braked, drives)
     median = state.implied[SPEED] if tells else median
     known = state.reckoned if state.started else estimate.speed
@@ -335,7 +332,8 @@ def watch_speeds(
         driven = accelerates or motor < -TORQUE
         if i < SPEED:
             braked = braking + motor > TORQUE or accel < DRAGGED_ACCEL or state.left_s > 0.0
-        apart = _judged(state, i, ground, free, braked, driven, drives)
+        beside = max(-BY_ONE_AXLE * slip / ground, 0.0) if motor > -TORQUE and not tells else 0.0
+        apart = _judged(state, i, ground, free, braked, driven, drives, beside)
         confirmed = i == SPEED and over_ground_confirmed(state.carried)
         if confirmed or (i < SPEED and _slides(state, i, apart, braked, driven, dt)):
             apart = math.nan

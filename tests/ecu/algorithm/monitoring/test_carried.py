@@ -7,6 +7,7 @@ from ecu.algorithm.monitoring.carried import (
     CARRIED_STATE,
     OVER_GROUND,
     WHEELS,
+    carry_speeds,
     follow_carried,
     over_ground_confirmed,
 )
@@ -47,4 +48,18 @@ def test_a_speed_that_was_silent_is_carried_anew(params) -> None:
     for speed in (20.0, 20.0, np.nan, 15.0):
         follow_carried(state, OVER_GROUND, speed, 0.0, DT)
     assert state["behind"][OVER_GROUND] == 0.0
+    assert not over_ground_confirmed(state)
+
+
+@pytest.mark.parametrize("spinning", [2, 3])
+def test_wheels_that_spin_as_the_car_is_driven_carry_nothing_on(params, spinning) -> None:
+    """The car drives off at 4 m/s^2; the vehicle speed begins to drift: the accelerometer confirms it not."""
+    state, speed = np.zeros(1, CARRIED_STATE)[0], 20.0
+    for k in range(1400):
+        accel = 0.0 if k < 600 else -4.0 if k < 1030 else 4.0
+        speed += accel * DT
+        spun = speed + 8.0 if 1040 < k < 1150 else speed * (1.03 if accel > 0.0 else 1.0)
+        wheels = [spun] * spinning + [speed] * (4 - spinning)
+        implied = np.array([*wheels, speed + 0.03 * k * DT])
+        carry_speeds(params[0], state, implied, accel, True, accel > 0.0, DT)
     assert not over_ground_confirmed(state)

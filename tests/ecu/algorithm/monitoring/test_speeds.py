@@ -313,6 +313,19 @@ def test_near_the_limit_of_grip_an_axle_that_slips_less_is_not_late(params, feed
     assert named == late
 
 
+def test_an_axle_that_is_not_driven_does_not_lie_because_the_vehicle_speed_does(params, feed) -> None:
+    """The other one spins as the car drives off, and slips by 4 %; the vehicle speed reads 1 m/s more."""
+    road = Road(params, feed)
+    road.drive(10.0)
+    road.drive(5.5, (0.99, 0.99, 0.99, 0.99, 1), -4.0)
+    for _ in range(9):
+        assert road.drive(0.1, (1, 1, 3, 3, 1.0 + 1.0 / road.speed), 4.8, 50.0) == ()
+    for _ in range(40):
+        over_ground = 1.0 + 1.0 / road.speed
+        named = road.drive(0.1, (1, 1, 1.05, 1.05, over_ground), 4.8, 50.0)
+        assert named in ((), NAMES[4:])
+
+
 def test_pressures_noise_brakes_no_wheel(road) -> None:
     """A sensor of 1.8 bar reads 100 N m now and then; the axle that is not driven is judged all the same."""
     road.noise = 60.0
