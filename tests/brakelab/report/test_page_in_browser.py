@@ -1,4 +1,4 @@
-"""The page in a real browser: every plot drawn, nothing on the console, nothing asked of the network."""
+"""The page in a real browser: every plot drawn, scrolled to or not, nothing on the console or asked of the network."""
 
 import json
 import os
@@ -76,7 +76,7 @@ def probed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 )
 def test_every_plot_is_drawn(probed: Path, tmp_path: Path, scheme: int, ink: str, width: int) -> None:
     own = (
-        f"--window-size={width},9000",
+        f"--window-size={width},900",
         f"--user-data-dir={tmp_path / 'profile'}",
         f"--blink-settings=preferredColorScheme={scheme}",
     )

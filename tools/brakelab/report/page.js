@@ -74,10 +74,42 @@
   });
   screenIsDark.addEventListener("change", recolour);
 
-  const started = setInterval(() => {
-    if (Bokeh.documents.length === 0) return;
-    clearInterval(started);
+  // Bokeh would draw every figure before the page answers: here those near the reader are drawn first, then the others, one by one.
+  const drawAll = Bokeh.embed.embed_items;
+  Bokeh.embed.embed_items = (text, items) => {
+    let Document, ViewManager, unescape;
+    try {
+      [Document, ViewManager, unescape] = [["document", "Document"], ["core/view_manager", "ViewManager"], ["core/util/string", "unescape"]]
+        .map(([module, name]) => Bokeh.require(module)[name]);
+    } catch { // another version's
+      return drawAll(text, items).then(() => (recolour(), fit()));
+    }
+    const [{ roots }] = items;
+    const page = Document.from_json(Object.values(JSON.parse(unescape(text)))[0]);
     recolour();
     fit();
-  }, 20);
+    const views = page.views_manager = new ViewManager([], Bokeh.index);
+    const waiting = new Map(Object.entries(roots).map(([model, id]) => [document.getElementById(id).closest("figure"), model]));
+    let drawn = Promise.resolve();
+    const draw = (figure) => {
+      const model = page.get_model_by_id(waiting.get(figure));
+      waiting.delete(figure);
+      near.unobserve(figure);
+      drawn = drawn.then(async () => {
+        const view = await views.build_view(model);
+        view.build(figure.firstElementChild);
+        Bokeh.index.add(view);
+      });
+    };
+    const near = new IntersectionObserver((seen) => seen.filter((one) => one.isIntersecting).forEach((one) => draw(one.target)), { rootMargin: "25%" });
+    waiting.forEach((_, figure) => near.observe(figure));
+    const drawOthers = () => drawn.then(() => setTimeout(() => {
+      const [figure] = waiting.keys();
+      if (!figure) return;
+      draw(figure);
+      drawOthers();
+    }, 20));
+    drawOthers();
+    addEventListener("beforeprint", () => [...waiting.keys()].forEach(draw));
+  };
 })();
