@@ -53,7 +53,7 @@ CONFIG = {
     },
     "extended_data_size": {code.number: 1 for code in TROUBLE_CODES},
     "request_timeout": 10,
-    "p2_timeout": 2,
+    "p2_timeout": 5,
     "use_server_timing": False,  # this machine may be busy
     "security_algo": lambda level, seed, params: key_of(bytes.fromhex(SECRET), bytes(seed)),
 }

@@ -70,7 +70,7 @@ class Wire:
 
     def _opens(self) -> bool:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM if self.stream else socket.SOCK_DGRAM)
-        self.socket.settimeout(2.0)
+        self.socket.settimeout(5.0)
         if not self.stream:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
         try:
