@@ -1,4 +1,4 @@
-"""The page in a real browser: every plot drawn, scrolled to or not, nothing on the console or asked of the network."""
+"""The page in a real browser: every plot drawn, scrolled to or not; nothing on the console, no request."""
 
 import json
 import os
