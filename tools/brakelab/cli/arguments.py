@@ -18,8 +18,8 @@ def present(given: list[Path] | Path | None) -> list[Path] | Path | None:
 
 
 @contextmanager
-def loading(words: str) -> Iterator[None]:
-    """Show a bar while a command imports what it needs: SciPy alone takes a second."""
+def working(words: str) -> Iterator[None]:
+    """Show a bar while a command works, or imports what it needs: SciPy alone takes a second."""
     from brakelab.results.progress import progress_bar
 
     with progress_bar(words, None):

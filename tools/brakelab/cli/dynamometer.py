@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any
 
-from brakelab.cli.arguments import Columns, loading, recorded
+from brakelab.cli.arguments import Columns, recorded, working
 from ecu.arguments import Commands, argument, option
 from ecu.completion import fitting, shipped
 from ecu.settings.resources import resource
@@ -53,7 +53,7 @@ def run(
     """Run a programme on the dynamometer. Record at 200 Hz; the pad follows none of the friction laws."""
     from ecu.compiling import report_compiling
 
-    with loading("lab run"):
+    with working("lab run"):
         from brakelab.identify.friction import command
 
     with report_compiling():
@@ -69,7 +69,7 @@ def look(
     columns: Columns = None,
 ) -> None:
     """Analyse a recording. Show principal components, shares of variance, effect of the previous stop."""
-    with loading("lab look"):
+    with working("lab look"):
         from brakelab.identify.friction import command
 
     command.look(data, columns)
@@ -97,7 +97,7 @@ def report(
     ] = None,
 ) -> int:
     """Show friction section by section, as for AK-Master (SAE J2522). Compare two linings."""
-    with loading("lab report"):
+    with working("lab report"):
         from brakelab.identify.friction.report import report as report_of
 
     return report_of(data, columns, programme, out)

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakelab.cli.arguments import Columns, loading, present, recorded
+from brakelab.cli.arguments import Columns, present, recorded, working
 from ecu.arguments import Commands, Config, Map, argument, flag, option
 
 app = Commands(help="Identify models from your own measurements.", no_args_is_help=True)
@@ -38,7 +38,7 @@ def friction(
     """Identify a friction law from dynamometer recordings. Fit all laws, choose one, state its limits."""
     from ecu.compiling import report_compiling
 
-    with loading("identify friction"):
+    with working("identify friction"):
         from brakelab.identify.friction import command
 
     with report_compiling():
@@ -60,12 +60,11 @@ def wear(
     ] = False,
 ) -> None:
     """Identify the wear law of brake linings from dynamometer blocks. Write a CONFIG."""
-    from brakelab.results.progress import progress_bar
     from ecu.errors import UserError
 
     if len(measured) > 1 and not from_logs:
         raise UserError(str(measured[1]), "", "one MANIFEST.csv; for blocks of drives give --from-logs")
-    with progress_bar("identify wear", None):
+    with working("identify wear"):
         from brakelab.identify.wear import command, from_drives
 
         if from_logs:
@@ -88,9 +87,7 @@ def dust(
     ] = False,
 ) -> None:
     """Identify particle emission from trips with a counter. Write a CONFIG."""
-    from brakelab.results.progress import progress_bar
-
-    with progress_bar("identify dust", None):
+    with working("identify dust"):
         from brakelab.identify.dust import command, cycle_page
 
         identify = cycle_page.report_cycle if cycle else command.identify_dust
@@ -108,7 +105,7 @@ def thermal(
     map: Map = None,
 ) -> None:
     """Identify the disc temperature model, dry and wet. Write a CONFIG."""
-    with loading("identify thermal"):
+    with working("identify thermal"):
         from brakelab.identify.thermal import command
 
     command.identify_thermal(logs, config, map, out)
@@ -127,7 +124,7 @@ def vehicle(
     ] = False,
 ) -> None:
     """Identify radii, mass, drag, tyres and brakes of a car. Write a CONFIG."""
-    with loading("identify vehicle"):
+    with working("identify vehicle"):
         from brakelab.identify.vehicle import command
 
     command.identify_vehicle(drives, config, map, closed, out)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from typer import Option
 
-from brakelab.cli.arguments import Plant, Scenario, Seed, present
+from brakelab.cli.arguments import Plant, Scenario, Seed, present, working
 from brakelab.cli.bench import HELP as BENCH_HELP
 from brakelab.cli.bench import bench
 from brakelab.cli.dynamometer import app as lab_app
@@ -231,9 +231,8 @@ def report(
 ) -> None:
     """Write results as a page of linked figures."""
     from brakelab.report import command
-    from brakelab.results.progress import progress_bar
 
-    with progress_bar("report", None):
+    with working("report"):
         command.report(result, truth, out, timing)
     wrote(out)
 
@@ -269,9 +268,7 @@ def compare(
     out: Annotated[Path | None, option("PAGE.html", "Page of both to write, self-contained")] = None,
 ) -> int:
     """Compare two results, largest difference first. Exit code 1: a difference matters."""
-    from brakelab.results.progress import progress_bar
-
-    with progress_bar("compare", None):
+    with working("compare"):
         from brakelab.results import compare
 
         if out is not None:
@@ -281,7 +278,7 @@ def compare(
         found = compare.find(a, b)
     compare.show(found, a, b)
     if out is not None:
-        with progress_bar("compare", None):
+        with working("compare"):
             from brakelab.report.comparison import write_page
 
             write_page(found, a, b, out)

@@ -257,8 +257,9 @@ def checked(
         outliers = np.flatnonzero(verdict == OUTLIER)
         if len(outliers):
             quality.note_damage(len(outliers), _place(block, outliers[0]))
-        if (verdict != KEPT).any():
-            frames = frames[verdict == KEPT]
+        kept = verdict == KEPT
+        if not kept.all():
+            frames = frames[kept]
         quality.stamps_backwards = int(stamps["backwards"])
         quality.stamps_repeated = int(stamps["repeated"])
         quality.frames_twice = int(stamps["twice"])

@@ -29,8 +29,6 @@ DOUBTFUL_SPEED: Final = 0.08
 """Share by which most stops begin faster or slower than the programme asks, that is no rig's tolerance."""
 ENOUGH: Final = 0.5
 """Share of the stops of a recording that must be of a section."""
-TWO: Final = 2
-"""Recordings that are compared."""
 
 
 def report(data: list[Path], columns: Path | None, programme: str | None, out: Path | None) -> int:
@@ -48,7 +46,7 @@ def report(data: list[Path], columns: Path | None, programme: str | None, out: P
         if out.suffix != ".html":
             raise UserError("--out", str(out), "is written as HTML; let the name end in .html")
         check_outputs(out, (out,), inputs_of(data, columns))
-    one, *others = [[path] for path in data] if len(data) <= TWO else [data]
+    one, *others = [[path] for path in data] if len(data) <= 2 else [data]
     first = _measure(one, columns, _programmes(programme))
     recordings = [first[1], *(_measure(other, columns, [first[0]])[1] for other in others)]
     if others and recordings[0].name == recordings[1].name:
